@@ -28,7 +28,7 @@ T = TypeVar("T")
 
 
 class _Test(NamedTuple):
-    """Test of a type: what is wrong with a value (nothing if it is right), what to give, and what makes one of others.
+    """Test of a type: what is wrong with a value, what the user should give, and how to convert other values.
 
     A class converts objects of other libraries by its method `_adopted`, which returns None for what it does not know.
     """
@@ -50,7 +50,7 @@ def checked(thing: T) -> T:
 
 
 def checked_but(*names: str) -> Callable[[T], T]:
-    """`checked`, for a function that refuses wrong arguments of these names itself, and says more."""
+    """`checked` for all arguments except these names, which the function checks itself."""
     return lambda thing: _checked(thing, thing.__name__, thing.__module__, names)  # type: ignore[attr-defined]
 
 
@@ -214,7 +214,7 @@ def _sequence(kinds: tuple[Any, ...], many: bool) -> _Test:
             return f"it has {len(value)} values, not {len(tests)}"
         for test, item in zip(tests * len(value) if many else tests, value, strict=False):
             if test is not None and (found := test.wrong(item)):
-                return f"of {brief(item)} in it, {found}"
+                return f"in the element {brief(item)}: {found}"
         return ""
 
     return _Test(wrong, f"a sequence, each {gives[0]}" if many else f"({', '.join(gives)})")
@@ -232,7 +232,7 @@ def _number(value: Any) -> str:
     try:
         float(value)
     except OverflowError:
-        return "it is beyond the range of numbers"
+        return "it is too large for float64"
     return ""
 
 
@@ -240,7 +240,7 @@ def _whole(value: Any) -> str:
     if found := _number(value):
         # Whole numbers have no range here: of too large ones it is for the function to say.
         return "" if isinstance(value, int) else found
-    return "" if float(value).is_integer() else "it is no whole number"
+    return "" if float(value).is_integer() else "it is not a whole number"
 
 
 def _numbers(value: Any) -> str:
@@ -250,10 +250,10 @@ def _numbers(value: Any) -> str:
         if array.dtype.kind == "O" and all(isinstance(one, (int, float)) for one in array.ravel().tolist()):
             array = array.astype(np.float64)  # whole numbers beyond 64 bits
     except OverflowError:
-        return "a number in it is beyond the range of numbers"
+        return "it contains a number that is too large for float64"
     except Exception:  # noqa: BLE001 - of NumPy, about lists of unequal lengths, and of classes of others
-        return "it is no array"
-    return "" if array.dtype.kind in "biuf" else {"c": "it holds complex numbers"}.get(array.dtype.kind, "no numbers")
+        return "it cannot be converted to an array"
+    return "" if array.dtype.kind in "biuf" else {"c": "it is complex"}.get(array.dtype.kind, "it has no numbers")
 
 
 def _text(value: Any) -> str:
@@ -266,8 +266,8 @@ def _path(value: Any) -> str:
     try:
         os.fsencode(name)
     except UnicodeEncodeError:
-        return "no file has such a name"
-    return "no file has a name with a zero in it" if "\0" in name else ""
+        return "this text cannot be a file name"
+    return "a file name cannot contain a null character" if "\0" in name else ""
 
 
 _SIMPLE: dict[Any, _Test] = {

@@ -74,7 +74,7 @@ def web_path(name: str) -> Path:
     """Path of a file that browsers run, such as ``page.js``; raises `InputError` where it was not built."""
     path = _web_folder() / name
     if not path.is_file():
-        found = f"{path} is not there: it is built, not kept with the source"
+        found = f"the file {path} does not exist, because it must be built"
         raise InputError(
             f"the script {name!r} for browsers", found, "build the script: run `make web` in the checkout (needs npm)"
         )

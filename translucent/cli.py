@@ -56,9 +56,9 @@ def main(arguments: list[str] | None = None) -> int:
         if "--debug" in given:
             raise
         if _out_of_memory(error):
-            found = f"the process may take no more ({error or 'no details'})"
-            return _failed(message_of("memory", found, "ask for less at a time, or raise its limit (ulimit -v)"), 1)
-        return _failed(f"unexpected {type(error).__name__}; {error or 'no details'}; --debug shows where", 1)
+            found = f"the limit of the process is reached ({error or 'no details'})"
+            return _failed(message_of("memory", found, "use smaller settings, or raise the limit (ulimit -v)"), 1)
+        return _failed(f"unexpected {type(error).__name__}; {error or 'no details'}; --debug shows the traceback", 1)
     return 0
 
 
@@ -93,7 +93,7 @@ def _refuse_two_words(given: list[str]) -> None:
 
 
 def _out_of_memory(error: Exception) -> bool:
-    """True of an error that says that the process gets no more memory, in the words of whoever raised it."""
+    """True if the message of an error says that memory is exhausted."""
     words = "can't start new thread", "failed to map segment", "cannot allocate memory"
     return isinstance(error, MemoryError) or any(said in str(error).lower() for said in words)
 
@@ -103,7 +103,7 @@ def _below_zero(error: click.ClickException, given: list[str]) -> str | None:
     if not (isinstance(error, click.NoSuchOption) and re.match(r"-[\d.]", error.option_name)):
         return None
     word = next((word for word in given if error.option_name in word), error.option_name)
-    return f"{word!r}; a number below 0, where none is taken; give one above 0"
+    return f"{word!r}; a negative number is read as an option; give a number above 0"
 
 
 def _dashed_file(error: click.ClickException, given: list[str]) -> str | None:
@@ -111,7 +111,7 @@ def _dashed_file(error: click.ClickException, given: list[str]) -> str | None:
     if not isinstance(error, click.NoSuchOption):
         return None
     word = next((word for word in given if word.startswith(error.option_name) and os.path.exists(word)), None)
-    return word and f"{word!r}; it is a file, but words that begin with a dash are options; write ./{word}"
+    return word and f"{word!r}; a file has this name, but words that begin with a dash are options; write ./{word}"
 
 
 def _quoting(error: click.ClickException) -> str:

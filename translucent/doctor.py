@@ -53,7 +53,7 @@ def examine_backends(names: Sequence[str] = get_args(Backend)) -> list[BackendRe
         info = context.info
         detail = f"{context.renderer}; {info['GL_VERSION']}; textures up to {info['GL_MAX_TEXTURE_SIZE']}"
         if context.gl.version_code < SHADER_STORAGE:
-            detail += "; no fragment lists, k-buffer and scattered light, which need 4.3"
+            detail += "; no fragment lists, k-buffer or scattered light, because these need OpenGL 4.3"
         reports.append(BackendReport(name, True, detail))
         if name != "window":
             context.gl.release()
@@ -97,8 +97,8 @@ def report(facts: dict[str, Any]) -> str:
         lines.append(f"{kind} {name}: {'works' if state['works'] else 'no'}: {state['detail']}")
     if facts["backend"] in (None, "cpu"):
         lines.append(
-            "No OpenGL 3.3 without a window: apt-get install libegl1 libgl1 libgl1-mesa-dri, "
-            "or pip install --no-deps lavavu-osmesa (Linux x86-64)."
+            "OpenGL 3.3 does not work without a window; install it: apt-get install libegl1 libgl1 "
+            "libgl1-mesa-dri, or pip install --no-deps lavavu-osmesa (Linux x86-64)."
         )
     if facts["backend"] is not None:
         lines.append(f"Rendering uses {facts['backend']}.")

@@ -23,7 +23,7 @@ def printable(text: str) -> str:
 
 
 def shortened(text: str, longest: int = LONGEST) -> str:
-    """`text` with its middle cut out if it is longer than the limit; beginning and end say the most."""
+    """`text` with its middle cut out if it exceeds the limit."""
     if len(text) <= longest:
         return text
     kept = longest - len(" ... ")

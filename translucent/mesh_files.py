@@ -128,7 +128,9 @@ def _read(path: Path, allow_outside: bool) -> Triangles:
     require_file(path, asked)
     if path.suffix[1:].lower() not in _GLTF and path.suffix[1:].lower() not in mesh_formats():
         do = (
-            "export it as .glb" if path.suffix.lower() in _SCENES_OF_PROGRAMS else "use glb, gltf, obj, stl, ply or off"
+            "export the model as .glb"
+            if path.suffix.lower() in _SCENES_OF_PROGRAMS
+            else "use glb, gltf, obj, stl, ply or off"
         )
         raise InputError(asked, f"the mesh format {path.suffix or 'without suffix'!r} is not supported", do)
     return read_triangles(path, asked, allow_outside)
@@ -216,7 +218,7 @@ def _require_archive_room(stream: BinaryIO, asked: str) -> None:
 def _require_free(stream: BinaryIO, kind: str, asked: str) -> None:
     """Raise `InputError` where a mesh takes more memory than is free, by what the header of its file says."""
     size = os.fstat(stream.fileno()).st_size
-    found, needed = f"its {size_text(size)} of text", _PER_BYTE * size
+    found, needed = f"{size_text(size)} of text", _PER_BYTE * size
     head = stream.read(_HEADER)
     if kind == "stl" and len(head) >= 84 and 84 + 50 * (count := int.from_bytes(head[80:84], "little")) == size:
         found, needed = f"its {count} triangles", PER_SOUP_TRIANGLE * count

@@ -136,7 +136,7 @@ class Renderer:
         return self.plan_requested(scene, request)
 
     def plan_requested(self, scene: Scene, request: RenderRequest) -> RenderPlan:
-        """Plan of what is requested of a scene, as `plan` makes it."""
+        """Plan for a rendering request, see `plan`."""
         check_scene(scene)
         plans = self._plans.setdefault(scene, {})
         if request not in plans:
@@ -242,7 +242,7 @@ class Renderer:
         backdrop: Backdrop | TextureBackdrop | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> Frame:
-        """Render what is requested of a scene; see `render`."""
+        """Render a request; see `render`."""
         self._require_open()
         size = check_size(size)
         if request.over_backdrop:
@@ -347,7 +347,7 @@ class Renderer:
         exposure: float = 0.0,
         tone: str = "none",
     ) -> RenderPlan:
-        """Render what is requested of a scene into a framebuffer; see `draw`."""
+        """Render a request into a framebuffer; see `draw`."""
         self._require_open()
         tone_curve(tone)
         check_exposure(exposure)

@@ -366,7 +366,7 @@ def _medium_of(values: Mapping[str, Any]) -> tuple[Medium | None, float | None, 
         length = _length(values["distance"])
         color, changed = clamp_colors(parse_color(values["color"]))
         if changed.any():
-            text = f"color {values['color']}: channels below {CLAMP:g} are taken for that"
+            text = f"color {values['color']}: channels below {CLAMP:g} were set to {CLAMP:g}"
             warnings.warn(TranslucentWarning(text), stacklevel=2)
         medium = Medium.from_color(color, length, ior=SOLID_IOR)
     elif "scattering_color" in values:
@@ -427,12 +427,14 @@ class _SceneFile:
     def scene(self) -> ComposedScene:
         """Read the whole."""
         if "version" in self.tree and "object" not in self.tree:
-            found = "it is a session of the previewer"
+            found = "the file is a session of the previewer"
             raise InputError(self.what, found, f"open the session with: translucent preview --session {self.path}")
         self._check(self.tree, _SCENE_KEYS, "")
         tables = self.tree.get("object", [])
         if not (isinstance(tables, list) and tables and all(isinstance(one, dict) for one in tables)):
-            raise self._wrong("", 0, "object", "no list of objects", "write [[object]], and model = ... below it")
+            raise self._wrong(
+                "", 0, "object", "the file has no list of objects", "write [[object]], and model = ... below it"
+            )
         loaded = [self._object(values, i) for i, values in enumerate(tables)]
         more: dict[str, Any] = {"lights": [self._light(values, i) for i, values in enumerate(self._lights())]}
         if "overlap" in self.tree:
@@ -451,7 +453,7 @@ class _SceneFile:
     def _object(self, values: dict[str, Any], number: int) -> _LoadedModel:
         self._check(values, _OBJECT_KEYS, "object", number)
         if not isinstance(model := values.get("model"), str):
-            raise self._wrong("object", number, "model", "no model is named", 'write model = "goblet", or a file')
+            raise self._wrong("object", number, "model", "the model is missing", 'write model = "goblet", or a file')
         chosen = [key for key in _MATERIALS if key in values]
         if len(chosen) > 1:
             raise self._wrong("object", number, chosen[1], f"{chosen[0]} is given, too", "give one material")
@@ -485,12 +487,14 @@ class _SceneFile:
     def _lights(self) -> list[dict[str, Any]]:
         tables = self.tree.get("light", [])
         if not (isinstance(tables, list) and all(isinstance(one, dict) for one in tables)):
-            raise self._wrong("", 0, "light", "no list of lights", "write [[light]], and type = ... below it")
+            raise self._wrong("", 0, "light", "the lights are not a list", "write [[light]], and type = ... below it")
         return tables
 
     def _light(self, values: dict[str, Any], number: int) -> Light:
         if (kind := values.get("type")) not in _LIGHTS:
-            raise self._wrong("light", number, "type", f"type {kind!r}", f"use one of {', '.join(_LIGHTS)}")
+            raise self._wrong(
+                "light", number, "type", f"no light has the type {kind!r}", f"use one of {', '.join(_LIGHTS)}"
+            )
         made = _LIGHTS[str(kind)]
         given = {key: value for key, value in values.items() if key != "type"}
         self._check(given, [one.name for one in fields(made) if one.name != "disc"], "light", number)
@@ -542,7 +546,7 @@ class _SceneFile:
 
     def _check(self, values: Any, known: list[str], table: str, number: int = 0) -> None:
         if not isinstance(values, dict):
-            raise self._wrong("", 0, table, "no table", f"write [{table}], and keys below it")
+            raise self._wrong("", 0, table, "this is not a table", f"write [{table}], and keys below it")
         for key in values:
             if key not in known:
                 close = close_names(key, known)

@@ -131,7 +131,7 @@ def _mesh(thing: object, unit: str | None) -> Mesh:
         return load_mesh(mesh_path(str(thing)) if own else thing, None if own else unit)
     if (mesh := thing if isinstance(thing, Mesh) else mesh_of(thing, unit)) is None:
         do = "give a Scene, a Mesh, a mesh of trimesh or PyVista, or a path"
-        raise InputError(f"show {brief(thing)}", f"it is of type {type(thing).__name__}", do)
+        raise InputError(f"show {brief(thing)}", f"this is an object of type {type(thing).__name__}", do)
     return mesh
 
 
@@ -142,7 +142,7 @@ def _window(thing: Any, material: Preset | Medium | None, unit: str | None) -> N
     from translucent.preview.session import save_session
 
     if isinstance(thing, Scene):
-        do = "show it as a page, or give the window a mesh: tl.show(mesh)"
+        do = "show the scene as a page, or show only a mesh: tl.show(mesh)"
         raise InputError(
             "show a Scene in the window", "the window would ignore the lights and the camera of the scene", do
         )

@@ -200,7 +200,7 @@ class Totals:
 
 def check_tiles(plan: RenderPlan) -> None:
     """Raise `InputError` if a plan needs the whole picture at once."""
-    do = "render it at once, in a size that fits into memory"
+    do = "render the whole picture at once, in a size that fits into memory"
     if plan.interfaces is not None and plan.has(PassName.SURFACES) and plan.interfaces.finds_exits:
         raise InputError(
             "rendering a picture in tiles",

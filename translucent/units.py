@@ -197,10 +197,10 @@ def likely_unit(longest: float, suffix: str) -> tuple[str, str] | None:
     """
     usual = [unit for unit in ("mm", "cm") if USUAL[0] <= longest * METRES_PER_UNIT[unit] <= USUAL[1]]
     if suffix.lower() == ".stl" and "mm" in usual:
-        return "mm", "an .stl is mostly in millimetres"
+        return "mm", ".stl files usually use millimetres"
     if longest < HARDLY_METRES or not usual:
         return None
-    return usual[0], f"{longest:.0f} metres are rare, and {_NAMES[usual[0]]} are not"
+    return usual[0], f"a size of {longest:.0f} metres is unusual, and {_NAMES[usual[0]]} are common"
 
 
 def scale_to(bounds: Array, height: float | None, longest: float | None, name: str) -> float:

@@ -14,7 +14,7 @@ def test_a_script_that_was_not_built_says_how_to_build_it(tmp_path: Path, monkey
     monkeypatch.setattr(assets, "_PACKAGE", tmp_path / "translucent")
     with pytest.raises(
         InputError,
-        match=r"the script 'page.js' for browsers; .* is not there.*; build the script: run `make web`",
+        match=r"the script 'page.js' for browsers; .* does not exist.*; build the script: run `make web`",
     ):
         assets.web_path("page.js")
 

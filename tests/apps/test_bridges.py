@@ -72,15 +72,15 @@ def test_what_is_no_surface_of_pyvista_is_refused_with_its_own_call() -> None:
     pyvista = pytest.importorskip("pyvista", reason="pyvista is not installed")
     sphere, points = pyvista.Sphere(), np.eye(3)
     for thing, sentence in (
-        (pyvista.PolyData(), r"it has no points and no faces"),
-        (pyvista.PolyData(points), r"it has 3 points and no faces; make a surface of points, cloud\.reconstruct"),
-        (pyvista.PointSet(points), r"it has 3 points and no faces"),
-        (pyvista.Line(), r"it has 2 points and 1 lines and no faces; .*line\.tube"),
-        (pyvista.Cube(), r"not all faces of the mesh are triangles; triangulate it: mesh\.triangulate\(\)"),
-        (sphere.strip(), r"triangle strips; triangulate it: mesh\.triangulate\(\)"),
+        (pyvista.PolyData(), r"has no points and no faces"),
+        (pyvista.PolyData(points), r"has 3 points and no faces; make a surface from points, cloud\.reconstruct"),
+        (pyvista.PointSet(points), r"has 3 points and no faces"),
+        (pyvista.Line(), r"has 2 points and 1 lines and no faces; .*line\.tube"),
+        (pyvista.Cube(), r"not all faces of the mesh are triangles; triangulate the mesh: mesh\.triangulate\(\)"),
+        (sphere.strip(), r"triangle strips; triangulate the mesh: mesh\.triangulate\(\)"),
         (pyvista.MultiBlock([sphere]), r"MultiBlock is not a surface; .*extract_surface\(\)\.triangulate\(\)"),
         (sphere.cast_to_unstructured_grid(), r"UnstructuredGrid is not a surface; .*extract_surface"),
-        (pyvista.ImageData(dimensions=(3, 3, 3)), r"ImageData is no surface"),
+        (pyvista.ImageData(dimensions=(3, 3, 3)), r"ImageData is not a surface"),
         (pyvista.Table({"a": points[0]}), r"of type Table"),
     ):
         for take in (tl.load_mesh, tl.show, tl.Object):
@@ -181,7 +181,7 @@ def test_what_is_no_mesh_of_triangles_is_refused_by_a_sentence(thing: Any, sente
 
 def test_unknown_and_mixed_units_are_refused(ball: trimesh.Trimesh) -> None:
     ball.units = "furlong"
-    with pytest.raises(tl.InputError, match="the unit 'furlong' of the mesh is not known; give unit="):
+    with pytest.raises(tl.InputError, match="the unit 'furlong' of the mesh is not known; state unit="):
         tl.load_mesh(ball)
     ball.units = "mm"
     mixed = trimesh.Scene([ball, trimesh.creation.box()])
@@ -237,13 +237,13 @@ def test_a_frame_gives_vertices_the_chord_of_the_ray_that_shows_them(ball: trime
 
 def test_values_of_another_mesh_are_refused(ball: trimesh.Trimesh) -> None:
     baked = tl.bake_vertex_thickness(ball, rays=2)
-    with pytest.raises(tl.InputError, match=r"8 of its 8 vertices are not those of mesh"):
+    with pytest.raises(tl.InputError, match=r"8 of its 8 vertices are not vertices of mesh"):
         tl.attach(trimesh.creation.box(), baked)
-    with pytest.raises(tl.InputError, match=r"vertices are not those of mesh"):
+    with pytest.raises(tl.InputError, match=r"vertices are not vertices of mesh"):
         tl.attach(ball, baked, unit="m")
     with pytest.raises(tl.InputError, match=r"quantity 'valid'.*use thickness, standard_error"):
         tl.attach(ball, baked, "valid")
-    with pytest.raises(tl.InputError, match="the result holds no values for the vertices of a single mesh"):
+    with pytest.raises(tl.InputError, match="this is not a single mesh with values at its vertices"):
         tl.attach(trimesh.Scene(ball), baked)
 
 

@@ -57,7 +57,7 @@ def test_photons_are_counted_in_the_plan(run: Run, model: Path, tmp_path: Path) 
         (("goblet", "--caustics=1000000000000"), "error: Caustics photons 1000000000000; the value must be a whole"),
         (
             ("goblet", "--caustics=-5"),
-            "error: '--caustics=-5'; a number below 0, where none is taken; give one above 0;",
+            "error: '--caustics=-5'; a negative number is read as an option; give a number above 0;",
         ),
         (("goblet", "--caustics=1e6"), "error: Invalid value for '--caustics': '1e6' is not a valid integer"),
     ],
@@ -71,7 +71,5 @@ def test_what_makes_no_caustics_is_told(run: Run, tmp_path: Path, options: tuple
 
 def test_another_renderer_shows_none(run: Run, model: Path, tmp_path: Path) -> None:
     found = run("render", model, "-o", tmp_path / "out.png", "--caustics", 10, "--opaque-with", "pyrender")
-    message = (
-        "error: --caustics; --opaque-with, which draws what light lands on; omit --opaque-with, or omit --caustics"
-    )
+    message = "error: --caustics; not possible with --opaque-with: it draws the objects"
     assert found.err.startswith(message)

@@ -34,9 +34,9 @@ from translucent.commands.console import echo
         ("empty.obj", b"", "the mesh has no faces"),
         ("points.obj", b"v 0 0 0\n", "the mesh has no faces"),
         (f"{'long' * 100}.obj", None, "no file has this path"),
-        ("point.obj", b"v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "all its vertices are at one point"),
-        ("model.fbx", b"Kaydara", "the mesh format '.fbx' is not supported; export it as .glb"),
-        ("model.blend", b"BLENDER", "the mesh format '.blend' is not supported; export it as .glb"),
+        ("point.obj", b"v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "all vertices of the mesh are at one point"),
+        ("model.fbx", b"Kaydara", "the mesh format '.fbx' is not supported; export the model as .glb"),
+        ("model.blend", b"BLENDER", "the mesh format '.blend' is not supported; export the model as .glb"),
         ("model.txt", b"v 0 0 0", "the mesh format '.txt' is not supported; use glb, gltf, obj, stl, ply or off"),
         ("nan.obj", b"v 0 nan 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "1 vertices are not finite (first: 0)"),
         ("beyond.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "error: mesh"),
@@ -76,7 +76,7 @@ def test_a_bad_model_is_refused(
         (["extinction"], "Missing argument 'COLOR'"),
         (["extinction", "teal"], "Missing argument 'DISTANCE'"),
         (["extinction", "red", "1cm", "--no-clamp"], "color 'red'; green = 0 is not in 0 < t <= 1"),
-        (["render", "x.obj", "--color"], "Option '--color' requires an argument; a shell takes #... for a comment"),
+        (["render", "x.obj", "--color"], "Option '--color' requires an argument; in a shell, quote the color"),
         (["extinction", "linear(.5,.5,2)", "1cm"], "blue = 2 is not in 0 < t <= 1"),
         (["extinction", "linear(.5,.5,nan)", "1cm"], "a channel of the color is not a finite number"),
         (["extinction", "reddish", "1cm"], "color 'reddish'"),
@@ -159,7 +159,7 @@ def test_a_hex_color_is_srgb(run: Run) -> None:
 
 def test_a_file_whose_name_begins_with_a_dash(run: Run, tmp_path: Path, in_tmp_path: Path) -> None:
     Path("-lid.obj").touch()
-    assert "'-lid.obj'; it is a file" in (line := one_error_line(run("explain", "-lid.obj")))
+    assert "'-lid.obj'; a file has this name" in (line := one_error_line(run("explain", "-lid.obj")))
     assert "write ./-lid.obj" in line
     assert "No such option" in one_error_line(run("explain", "-lad.obj"))
 
@@ -178,7 +178,7 @@ def test_a_standard_output_that_is_full(run: Run, monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr("translucent.commands.console.click.echo", full)
     line = one_error_line(run("presets"), 1)
-    assert "standard output; it cannot be written (No space left on device)" in line
+    assert "standard output; the output cannot be written (No space left on device)" in line
 
 
 @pytest.mark.parametrize("err", [False, True])
@@ -207,8 +207,8 @@ def test_a_full_memory_is_called_so(run: Run, monkeypatch: pytest.MonkeyPatch, e
 
     monkeypatch.setattr("translucent.media.presets.presets", fail)
     line = one_error_line(run("presets"), code=1)
-    assert line.startswith("error: memory; the process may take no more (")
-    assert line.endswith("; ask for less at a time, or raise its limit (ulimit -v)")
+    assert line.startswith("error: memory; the limit of the process is reached (")
+    assert line.endswith("; use smaller settings, or raise the limit (ulimit -v)")
 
 
 #: The command line, with Ctrl-C while it is imported.

@@ -32,7 +32,7 @@ def test_a_scene_of_opaque_objects_is_refused_and_yet_explained(run: Run, tmp_pa
     result = run("explain", model)
     assert (result.code, result.err) == (0, "")
     assert "'Box 0', opaque: 12 faces, 1 x 1 x 2 m\n" in result.out
-    assert "plan: none, since no object is translucent; see with --preset NAME" in result.out
+    assert "plan: none, because no object is translucent; add --preset NAME" in result.out
     assert strict_json(run("explain", model, "--json").out)["plan"] is None
     assert "plan: SignedDepth" in run("explain", model, "--preset", "merlot").out
 
@@ -69,7 +69,7 @@ def test_explain_tells_the_objects_of_a_scene(run: Run, tmp_path: Path) -> None:
         "'Box 0', body: 12 faces, 1 x 1 x 2 m; closed, convex, 1 component",
         "'Box 1', thin wall: 12 faces",
         "medium: 'Box 0': extinction 2.773, 1.386, 0 1/m",
-        "medium: 'Box 1': thin, white light is #bcbcbc behind it",
+        "medium: 'Box 1': thin-walled: white light is #bcbcbc behind it",
         "plan: SignedDepth",
     ):
         assert words in result.out
@@ -79,7 +79,7 @@ def test_explain_tells_the_objects_of_a_scene(run: Run, tmp_path: Path) -> None:
     assert (told["lights"], told["left_out"]) == (0, [])
     assert told["plan"]["passes"][-1]["name"] == "traced_interfaces"
     assert told["plan"]["interfaces"] == "TracedInterfaces(depth=24, forks=2)"
-    assert "not modelled: rays that cross more than 24 interfaces, or that follow the weaker of" in result.out
+    assert "approximation: rays that cross more than 24 interfaces, or follow the weaker of" in result.out
     told = strict_json(run("explain", model, "--interfaces", "screen", "--json").out)
     assert told["plan"]["passes"][-1]["name"] == "surfaces"
     assert told["plan"]["interfaces"] == "ScreenInterfaces()"
@@ -90,7 +90,7 @@ def test_explain_says_how_light_scattered_many_times_is_shown(run: Run, cube: Pa
     milk = ("explain", cube, "--scattering-color", "white", "--mean-free-path", "1cm", "--json")
     told = {name: strict_json(run(*milk, "--scattering", name).out)["plan"] for name in SCATTERINGS}
     assert told["diffusion"]["given_back"] == "diffuses (Diffusion(resolution=32)) in 1 body"
-    assert told["layer"]["given_back"] == "leaves as from layers in 1 body"
+    assert told["layer"]["given_back"] == "leaves as from flat layers in 1 body"
     assert told["single"]["given_back"] is None
     assert strict_json(run(*milk).out)["plan"] == told["diffusion"]
 
@@ -98,7 +98,7 @@ def test_explain_says_how_light_scattered_many_times_is_shown(run: Run, cube: Pa
 def test_explain_says_what_is_black(run: Run) -> None:
     plan = strict_json(run("explain", "wine", "--preset", "merlot", "--json").out)["plan"]
     (remark,) = plan["remarks"]
-    assert remark.startswith("'wine.ply': black: 1.6e-03 of white light passes 42.1 mm, the mean thickness")
+    assert remark.startswith("'wine.ply': black: only 1.6e-03 of white light passes 42.1 mm, the mean thickness")
     assert f"  remark: {remark}\n" in run("explain", "wine", "--preset", "merlot").out
     assert "remark" not in run("explain", "bear", "--preset", "merlot").out
 
@@ -126,8 +126,8 @@ def test_a_repair_is_a_warning_line_and_no_part_of_the_json(run: Run, tmp_path: 
         warnings.simplefilter("always")  # pytest turns warnings into errors, which nothing else does
         result = run("explain", path, "--json")
     assert result.code == 0
-    assert result.err.splitlines() == ["warning: mesh 'inverted.off': turned 1 closed part outwards"]
-    assert strict_json(result.out)["mesh"]["repairs"] == ["turned 1 closed part outwards"]
+    assert result.err.splitlines() == ["warning: mesh 'inverted.off': flipped 1 closed part outwards"]
+    assert strict_json(result.out)["mesh"]["repairs"] == ["flipped 1 closed part outwards"]
 
 
 def test_the_size_of_a_model_is_said_and_may_be_requested(run: Run, tmp_path: Path) -> None:
@@ -142,7 +142,7 @@ def test_the_size_of_a_model_is_said_and_may_be_requested(run: Run, tmp_path: Pa
     assert refused.code == 2
     assert refused.err == "error: --unit mm; --height is given, too; both options scale the model: use one of them\n"
     wax = run("explain", model, "--preset", "wax").out
-    assert "'cow.obj': opaque at this size, as plastic" in wax
+    assert "'cow.obj': opaque at this size, like plastic" in wax
 
 
 def test_a_color_is_that_of_a_solid_unless_it_is_asked_for_without_an_interface(run: Run) -> None:
@@ -152,4 +152,6 @@ def test_a_color_is_that_of_a_solid_unless_it_is_asked_for_without_an_interface(
     fog = strict_json(run("explain", "bear", *color, "--ior", "1", "--json").out)["plan"]
     assert fog["interfaces"] is None
     clear = run("explain", "bear", "--color", "white", "--distance", "1cm")
-    assert clear.err.startswith("note: --color white takes no light away, so that it is clear glass; for white wax or")
+    assert clear.err.startswith(
+        "note: --color white absorbs no light, so the medium looks like clear glass; for white wax or"
+    )

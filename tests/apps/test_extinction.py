@@ -43,8 +43,8 @@ def test_the_words_name_each_length_apart(run: Run) -> None:
     assert "0.069315   0.034657          0 1/mm" in lines[2]
     assert [float(v) for v in lines[4].split()[1:4]] == pytest.approx([0.01, 0.02, math.inf])
     assert lines[4].startswith("half-value ")
-    assert "light has the color at 0.02 m, 1/e (37 %) at a mean free path, half at a half-value" in lines[5]
-    assert lines[-1].startswith("warning         blue is 1 (saturated)")
+    assert "light has this color after 0.02 m; a mean free path leaves 37 %, a half-value half" in lines[5]
+    assert lines[-1].startswith("warning         blue is 1, so the medium absorbs nothing of it")
     assert "\x1b" not in out
 
 
@@ -64,14 +64,14 @@ def test_json_has_all_numbers(run: Run) -> None:
     assert told["color"][1:] == [1e-4, 1e-4]
     assert told["extinction_per_unit"][1] == pytest.approx(-math.log(1e-4), rel=1e-14)
     assert told["half_value_thickness"][1] == pytest.approx(told["mean_free_path"][1] * math.log(2), rel=1e-14)
-    assert told["warnings"][0] == "color clamped to 0.0001 where it was below"
+    assert told["warnings"][0] == "channels of the color below 0.0001 were set to 0.0001"
 
 
 @pytest.mark.parametrize("color", ["teal", "#ff0000", "#000", "000000", "linear(0,.5,1)"])
 def test_a_channel_of_0_is_clamped_and_told_unless_that_is_refused(run: Run, color: str) -> None:
     code, out, err = run(color, "2cm")
     assert (code, err) == (0, "")
-    assert "warning         color clamped to 0.0001 where it was below" in out.splitlines()
+    assert "warning         channels of the color below 0.0001 were set to 0.0001" in out.splitlines()
     assert (
         "is not in 0 < t <= 1; a channel of 0 would need an infinite extinction; use a value such as 0.001 for"
         in one_error_line(run(color, "2cm", "--no-clamp"))
@@ -84,7 +84,7 @@ def test_a_bright_color_is_not_touched_by_clamping(run: Run) -> None:
 
 
 def test_a_color_that_the_shell_took_for_a_comment_is_told(run: Run) -> None:
-    hint = "a shell takes #... for a comment: quote it, '#7b1e3a', or leave the # out"
+    hint = "in a shell, quote the color: '#7b1e3a' (# begins a comment)"
     assert f"Missing argument 'COLOR'. {hint[:1].upper()}{hint[1:]}" in one_error_line(run())
     assert f"color ''; the text is empty; {hint}" in one_error_line(run("", "1cm"))
 
@@ -93,7 +93,7 @@ def test_a_filament_is_told_by_its_transmission_distance(run: Run) -> None:
     code, out, err = run("--td", "4mm")
     assert (code, err) == (0, "")
     assert "0.1        0.1        0.1 linear" in out.splitlines()[0]
-    assert "filament TD     4 mm: where 10 % of the luminance of white light is left" in out.splitlines()
+    assert "filament TD     4 mm: where 10 % of the luminance of white light passes" in out.splitlines()
     assert run("--td", "4").out == out
     told = json.loads(run("--td", "0.4", "--unit", "cm", "--td-transmittance", "0.05", "--json").out)
     assert told["extinction"] == pytest.approx([-math.log(0.05) / 4e-3] * 3, rel=1e-14)
@@ -117,7 +117,7 @@ def test_for_an_engine_only_the_block_is_printed(run: Run, monkeypatch: pytest.M
     monkeypatch.setattr("translucent.materials.text_block", text_block)
     code, out, err = run("linear(0.25,0.5,1)", "2cm", "--as", "unreal")
     assert (code, out) == (0, "block for unreal\n")
-    assert "warning: blue is 1 (saturated)" in err
+    assert "warning: blue is 1, so the medium absorbs nothing of it" in err
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -125,7 +125,7 @@ def test_every_engine_has_a_block(run: Run, target: str) -> None:
     """A color has no surface, which is told where the material has one."""
     code, out, err = run("#7b1e3a", "1cm", "--as", target)
     assert code == 0
-    assert ("its index of refraction is 1" in err) == (target not in ("css", "json"))
+    assert ("its ior is 1" in err) == (target not in ("css", "json"))
     assert err.count("\n") <= 1
     assert len(out) > 20
     assert run("#7b1e3a", "1cm", "--as", target, "--ior", "1.5").err == ""
@@ -210,12 +210,16 @@ def test_a_bad_row_does_not_stop_the_others(run: Run, here: Path) -> None:
 def test_a_table_to_csv_with_clamping(run: Run, here: Path) -> None:
     (here / "in.json").write_text('[{"name": "red", "color": [1, 0, 0], "distance": 1}]')
     told = run("--batch", "in.json", "-o", "out.csv", "--unit", "cm")
-    assert told == (0, "", "warning: 1 of 1 colors clamped to 0.0001 where they were below; their warnings say so\n")
+    assert told == (
+        0,
+        "",
+        "warning: 1 of 1 colors had channels below 0.0001, now 0.0001; see the warnings of these rows\n",
+    )
     with (here / "out.csv").open(newline="") as stream:
         (row,) = csv.DictReader(stream)
     assert (row["mean_free_path_r"], row["extinction_r"]) == ("inf", "0.0")
     assert float(row["extinction_g"]) == pytest.approx(-math.log(1e-4) / 0.01, rel=1e-14)
-    assert row["warnings"].startswith("color clamped to 0.0001 where it was below | red is 1")
+    assert row["warnings"].startswith("channels of the color below 0.0001 were set to 0.0001 | red is 1")
 
 
 def test_no_name_is_a_formula_to_a_spreadsheet(run: Run, here: Path) -> None:
@@ -273,12 +277,12 @@ def test_photographs_are_fitted(run: Run, here: Path) -> None:
     assert told["samples"] == [6, 6, 6]
     code, out, err = run(*how, "--patch", "20,0,60,20=1mm,2mm,4mm", "--ior", "1.5")
     assert (code, err) == (0, "")
-    assert "to either side hold the extinction with 95 %" in out
+    assert "1/m (95 % confidence interval of the extinction)" in out
     assert "6, 6, 6 patches in 2 photographs" in out
-    assert "plates about" not in out
+    assert "the samples are about" not in out
     thick = run(*how, "--patch", "20,0,60,20=1,2,4").out
-    assert "plates about 2 m thick: lengths that name no unit are in metres" in thick
-    assert "this fit also needs --patch; say where" in one_error_line(run(*how))
+    assert "the samples are about 2 m thick: lengths without a unit are metres" in thick
+    assert "this fit also needs --patch; give the rectangles" in one_error_line(run(*how))
     assert "the rectangle lies outside the picture of" in one_error_line(run(*how, "--patch", "70,0,60,20=1mm"))
     assert "these options apply only to --fit PHOTO" in one_error_line(run("gray", "1cm", "--white", "0,0,1,1"))
     assert "give one table, one .toml file" in one_error_line(run("--fit", "a.csv", "--fit", "b.csv"))
@@ -305,7 +309,7 @@ def test_the_medium_for_an_average_color(run: Run, plate: Path) -> None:
     assert told["on"]["mean_thickness"] == pytest.approx(0.002, rel=2e-4)
     assert told["distance"] == told["on"]["mean_thickness"]
     assert told["on"]["model"] == "plate.stl"
-    assert told["warnings"][0].startswith("blue is 1 (saturated)")
+    assert told["warnings"][0].startswith("blue is 1, so the medium absorbs nothing of it")
 
 
 def test_a_model_takes_the_place_of_the_distance(run: Run, renderer: tl.Renderer) -> None:
@@ -340,8 +344,10 @@ def test_the_words_tell_the_average_and_the_thin_and_thick_parts(run: Run, rende
     lines = out.splitlines()
     assert re.fullmatch(r"on bear: \d+ pixels, 0\.0055\d* m thick on average", lines[0])
     assert lines[1].endswith(" linear, #7b1e3a sRGB")
-    assert [line.rpartition("; ")[2] for line in lines[2:7]] == [f"{p}% of it is thinner" for p in (5, 25, 50, 75, 95)]
-    assert re.match("warning         the average green is made by the edges: 7.% of it comes from the thin", lines[-1])
+    assert [line.rpartition("; ")[2] for line in lines[2:7]] == [
+        f"{p}% of the model is thinner" for p in (5, 25, 50, 75, 95)
+    ]
+    assert re.match("warning         7.% of the average green comes from the thin", lines[-1])
 
 
 def test_for_an_engine_the_color_is_stated_at_the_thickness_of_the_model(run: Run, plate: Path) -> None:
@@ -363,7 +369,7 @@ def test_for_an_engine_a_dark_color_is_stated_nearer_and_the_thickness_stays(run
 def test_a_black_channel_is_clamped_on_a_model_too(run: Run, plate: Path) -> None:
     told = json.loads(run("#ff0000", *PLATE, "--json")[1])
     assert told["on"]["average_color"] == pytest.approx([1.0, 1e-4, 1e-4], rel=1e-9)
-    assert told["warnings"][0] == "color clamped to 0.0001 where it was below"
+    assert told["warnings"][0] == "channels of the color below 0.0001 were set to 0.0001"
 
 
 @pytest.mark.parametrize(
@@ -371,9 +377,9 @@ def test_a_black_channel_is_clamped_on_a_model_too(run: Run, plate: Path) -> Non
     [
         (
             ["black", "--no-clamp", *PLATE],
-            "average color with red = 0; the value must satisfy 0.0001 <= t <= 1; give 0.0001 or more",
+            "average color with red = 0; the value must satisfy 0.0001 <= t <= 1; use 0.0001 or more",
         ),
-        (["linear(1.5,1,1)", *PLATE], "red = 1.5; the value must satisfy 0.0001 <= t <= 1; a medium cannot add light"),
+        (["linear(1.5,1,1)", *PLATE], "red = 1.5; the value must satisfy 0.0001 <= t <= 1; use a color below 1"),
         (["gray", "--on", "none.obj"], "none.obj"),
         (
             ["gray", "--on", "bear", "--unit", "cm"],
@@ -418,9 +424,9 @@ def test_an_open_model_has_no_color(run: Run, plate: Path) -> None:
     [
         (["--batch", "none.csv"], "table 'none.csv'; no file has this path"),
         (["--batch", "."], "table '.'; the path is a folder"),
-        (["--batch", "empty.csv"], "table 'empty.csv'; no column 'name': it is empty"),
+        (["--batch", "empty.csv"], "table 'empty.csv'; no column 'name': the file is empty"),
         (["--batch", "head.csv"], "table 'head.csv'; the table has no rows; add at least one row"),
-        (["--batch", "few.csv"], "no column 'distance': its first line says name, color"),
+        (["--batch", "few.csv"], "no column 'distance': the first line is name, color"),
         (["--batch", "bytes.csv"], "not UTF-8 text"),
         (["--batch", "bad.json"], "table 'bad.json'; the file is not valid JSON:"),
         (["--batch", "dict.json"], "not a list of objects"),
@@ -455,7 +461,7 @@ def test_an_open_model_has_no_color(run: Run, plate: Path) -> None:
         ),
         ([], "Missing argument 'COLOR'"),
         (["gray"], "Missing argument 'DISTANCE'. A color has a meaning only at a distance"),
-        (["jade"], "For the preset of this name write --preset jade"),
+        (["jade"], "Jade is a preset: write --preset jade"),
     ],
     ids=lambda v: " ".join(v) if isinstance(v, list) else None,
 )

@@ -63,7 +63,7 @@ def test_links_lead_outside_only_where_that_is_said(run: Run, tmp_path: Path, ar
     words = [word.format(tmp_path) for word in arguments]
     small = ["--size", "8", "--rays", "2", "--unwrap"] if words[0] == "bake" else []
     line = one_error_line(run(*words, tmp_path / "model" / "a.gltf", *small))
-    assert "leads outside the folder of the model; keep its files together, or say --allow-outside" in line
+    assert "leads outside the folder of the model; keep all files together, or add --allow-outside" in line
     assert {path.name for path in tmp_path.iterdir()} == {"model", "box.bin"}
     assert run(*words, tmp_path / "model" / "a.gltf", *small, "--allow-outside").code == 0
 

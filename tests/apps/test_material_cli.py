@@ -117,7 +117,9 @@ def test_a_preset_brings_its_index_of_refraction_and_tells_what_is_lost(run: Run
         warnings.simplefilter("always")
         code, _, err = run("material", "apply", model, "--preset", "marble", "--object", "Wine", "-o", output)
     assert code == 0
-    assert "warning: glTF holds absorption only: scattering is written as extinction, emission is lost\n" in err
+    assert (
+        "warning: glTF stores only absorption: scattering is written as absorption, and emission is left out\n" in err
+    )
     medium = read_materials(output)[0].medium()
     assert medium.ior == tl.preset("marble").medium.ior
     np.testing.assert_allclose(medium.extinction, tl.preset("marble").medium.extinction, rtol=1e-13)

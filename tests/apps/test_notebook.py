@@ -81,7 +81,7 @@ def test_what_would_take_long_is_told_and_not_drawn(scene: tl.Scene, monkeypatch
     monkeypatch.setattr(showing, "MANY_TRIANGLES", 11)
     data, metadata = scene._repr_mimebundle_()
     assert (set(data), metadata) == ({"text/plain", "text/html"}, {})
-    assert "Not drawn here, since it has 0.0 million triangles: renderer.render(scene, size) does." in data["text/html"]
+    assert "No picture, because it has 0.0 million triangles; use renderer.render(scene, size)." in data["text/html"]
 
 
 def test_where_nothing_draws_it_says_why(scene: tl.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -89,7 +89,7 @@ def test_where_nothing_draws_it_says_why(scene: tl.Scene, monkeypatch: pytest.Mo
         raise tl.RenderError("rendering", "no <driver>", "install one")
 
     monkeypatch.setattr(showing, "_renderer", fail)
-    assert "Not drawn here: rendering; no &lt;driver&gt;; install one" in scene._repr_html_()
+    assert "No picture: rendering; no &lt;driver&gt;; install one" in scene._repr_html_()
 
 
 # The widget
@@ -228,7 +228,7 @@ def test_the_camera_is_one_in_both_directions(view: Any, scene: tl.Scene) -> Non
         (
             "preset",
             "wax",
-            "preset 'wax' in a view; this preset scatters or emits light, and a view can only change media that absorb",
+            "preset 'wax' in a view; this preset scatters or emits light, but a view supports only media that absorb",
         ),
         ("preset", "vine", "vine"),
         ("medium", 1, "medium 1; the scene has 1"),

@@ -291,5 +291,5 @@ def test_what_has_no_page_says_what_to_do(renderer: tl.Renderer) -> None:
             frame, plan=dataclasses.replace(frame.plan, request=RenderRequest(caustics=tl.Caustics(100)))
         ).to_html()
     behind = tl.Backdrop(np.zeros((3, 4, 3)), np.full((3, 4), np.inf))
-    with pytest.raises(tl.InputError, match=r"holds no scene.*tl.write_page"):
+    with pytest.raises(tl.InputError, match=r"the frame has no scene.*tl.write_page"):
         renderer.render(scene, (4, 3), backdrop=behind).to_html()

@@ -33,7 +33,7 @@ def test_the_plan_of_paths_is_explained(run: Run) -> None:
     done = run("explain", *JADE[:5], "--paths", 8)
     assert done.code == 0
     assert "path_trace: requested: 8 random paths for each pixel" in done.out
-    assert "limit: radiance is a mean over 8 random paths: its noise is in standard_error" in done.out
+    assert "limit: radiance is the mean of 8 random paths; frame.standard_error states its noise" in done.out
 
 
 @pytest.mark.parametrize(

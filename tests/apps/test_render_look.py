@@ -164,7 +164,7 @@ def test_a_white_body_in_bright_light_is_told_with_an_exposure_that_shows_it(
     path = tmp_path / "box.png"
     done = run("render", "soap", "-o", str(path), *options)
     assert done.code == 0
-    assert ("100% of what media cover is brighter than white" in done.err) == told
+    assert ("100% of the pixels of media are brighter than white" in done.err) == told
     if told:
         assert "--exposure -0.5" in done.err
         assert "brighter than white" not in run("render", "soap", "-o", str(path), *options[:-1], "-0.5").err

@@ -146,7 +146,7 @@ def test_thickness_needs_no_stage() -> None:
         (("--stage", "studoi"), "stage 'studoi'; no stage has this name; did you mean studio?"),
         (
             ("--stage", "night", "--opaque-with", "pyrender"),
-            "--stage night; --opaque-with, which draws no shadows of a stage",
+            "--stage night; not possible with --opaque-with: it draws no shadows of the stage",
         ),
     ],
 )

@@ -140,7 +140,7 @@ OBJECT = '[[object]]\nmodel = "sphere"\n'
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[[object]]\nmodel = 3\n", "line 2, model; no model is named"),
+        ("[[object]]\nmodel = 3\n", "line 2, model; the model is missing"),
         (
             '[[object]]\nmodel = "sfere"\n',
             "line 2, model; model 'sfere'; no file and no built-in mesh has this name; did you",
@@ -153,13 +153,19 @@ OBJECT = '[[object]]\nmodel = "sphere"\n'
         (OBJECT + 'color = "#aa5555"\ndistance = "2 cx"\n', "line 4, distance; "),
         (OBJECT + "translate = [1, 2]\n", "line 3, translate; [1, 2]; write translate = [0, 0.1, 0]"),
         (OBJECT + "surface = { roughnes = 1 }\n", "line 3, roughnes; unknown key 'roughnes'; did you mean roughness"),
-        (OBJECT + "[[light]]\ntype = 'lamp'\n", "line 4, type; type 'lamp'; use one of directional, point, sphere"),
+        (
+            OBJECT + "[[light]]\ntype = 'lamp'\n",
+            "line 4, type; no light has the type 'lamp'; use one of directional, point, sphere",
+        ),
         (OBJECT + "[[light]]\ntype = 'point'\nposition = [0, 0, 0]\n", "line 4, type; a point light; "),
         ("stage = 'nigth'\n" + OBJECT, "line 1, stage; stage 'nigth'; no stage has this name; did you mean night?"),
         (OBJECT + "[camera]\neye = [0, 0, 1]\nfit = 1\n", "line 5, fit; fit; the key eye is given, too"),
         ("objects = 1\n", "line 1, objects; unknown key 'objects'; did you mean object?"),
         ("[[object]\n", "the file is not valid TOML: "),
-        ("version = 1\n", "it is a session of the previewer; open the session with: translucent preview --session"),
+        (
+            "version = 1\n",
+            "the file is a session of the previewer; open the session with: translucent preview --session",
+        ),
     ],
 )
 def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, message: str) -> None:
@@ -191,7 +197,7 @@ def test_several_models_are_drawn(run: Run, tmp_path: Path) -> None:
     options = ("-o", tmp_path / "a.npz", "--size", "24x18", "--samples", "1", "--stage", "none")
     result = run("render", "sphere:crystal", "soap:whisky", *options)
     assert result.code == 0
-    assert "where bodies touch, sphere displaces soap" in result.err
+    assert "where bodies overlap, sphere displaces soap" in result.err
     assert len(result.out.splitlines()) <= 6
     explained = run("explain", "sphere:crystal", "soap:whisky")
     assert "2 objects, 2 of them translucent" in explained.out

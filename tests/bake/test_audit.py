@@ -147,7 +147,7 @@ def test_without_attenuation_a_wrong_factor_is_a_warning(tmp_path: Path) -> None
     path = model(tmp_path / "ball.glb", 0.2, attenuationColor=[1, 1, 1])
     (found,) = tl.check_materials(path).findings
     assert (found.severity, found.code) == ("warning", "thickness-too-large")
-    assert "nothing attenuates" in found.text
+    assert "the medium is clear" in found.text
 
 
 def test_a_shell_that_is_taken_for_a_solid(tmp_path: Path) -> None:
@@ -211,8 +211,8 @@ def test_a_ball_of_centimetres_in_a_file_of_metres(tmp_path: Path) -> None:
     large = BALL.copy().apply_scale(100.0)
     found = tl.check_materials(model(tmp_path / "ball.glb", 1.75, large)).findings
     assert [one.code for one in found] == ["attenuation-black", "units-suspect"]
-    assert "1.4 m thick it is black; 14 mm thick it would be" in found[1].text
-    assert "scale its node by 0.01" in found[1].do
+    assert "at a thickness of 1.4 m, the body is black; at 14 mm, it would be" in found[1].text
+    assert "scale the node by 0.01" in found[1].do
     clear = model(tmp_path / "clear.glb", attenuationDistance=20.0)
     assert {"attenuation-none", "units-suspect"} <= codes(clear)
     weak = model(tmp_path / "weak.glb", 1.75, large, attenuationDistance=1.0)
@@ -279,7 +279,7 @@ def test_a_turned_stretch_is_told_with_its_error(tmp_path: Path) -> None:
     assert (found.severity, found.code) == ("warning", "scale-uneven")
     matrix = np.array([[1, -3, 0], [1, 3, 0], [0, 0, math.sqrt(2)]]) / math.sqrt(2)
     least, most = scale_errors(matrix)
-    assert f"take {least:.2f} to {most:.2f}" in found.text
+    assert f"use {least:.2f} to {most:.2f}" in found.text
     along = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)  # the image of x, which the node leaves as long as it is
     true = 1.0 / float(np.linalg.norm(np.linalg.solve(matrix, along)))
     assert true == pytest.approx(1.0)
@@ -330,9 +330,9 @@ def test_the_verb_tells_findings_and_fails_for_errors(run: Run, tmp_path: Path) 
     code, out, err = run("material", "check", model(tmp_path / "wrong.glb", 0.2))
     assert code == 1
     assert err.count("\n") == 1
-    assert "1 finding of severity error; write thicknessFactor 0.0132 to 0.0198 (--fix bakes a map)" in err
+    assert "1 finding of severity error; set thicknessFactor to 0.0132 to 0.0198 (--fix bakes a map)" in err
     lines = out.splitlines()
-    assert lines[0].endswith("1 body that light passes; 1 error, 0 warnings, 0 notes")
+    assert lines[0].endswith("1 translucent body; 1 error, 0 warnings, 0 notes")
     assert lines[1] == "error   thickness-too-large: material 0 'Glass', mesh 'Ball', node 'Ball'"
     shown = lines[-1].split("three.js ")[1].split(",")[0]
     np.testing.assert_allclose(parse_color(shown), np.array(DENSE["attenuationColor"]) ** 10, atol=3e-3)

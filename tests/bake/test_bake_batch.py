@@ -127,7 +127,7 @@ def test_a_worker_of_another_version_bakes_nothing(make_jobs: Any) -> None:
     (job,) = make_jobs(1)
     entry = run_job(job, "0.0.0")
     assert entry["status"] == "failed"
-    assert entry["error"] == f"its worker has version {tl.__version__}, and not 0.0.0; install that"
+    assert entry["error"] == f"the worker has version {tl.__version__}, and not 0.0.0; install 0.0.0 there"
     assert not Path(job["output"]).exists()
     assert run_job(job, tl.__version__)["status"] == "baked"
 
@@ -180,9 +180,9 @@ def test_a_mesh_that_was_inside_out_is_told(make_ball: Any, tmp_path: Path) -> N
     ball.invert()
     ball.export(tmp_path / "inverted.obj")
     job = {"model": str(tmp_path / "inverted.obj"), "output": str(tmp_path / "t.npy"), "settings": QUICK}
-    with pytest.warns(tl.TranslucentWarning, match="turned"):
+    with pytest.warns(tl.TranslucentWarning, match="flipped"):
         report = bake_many([job], Serial())
-    assert "; turned 1 closed part outwards" in str(report)
+    assert "; flipped 1 closed part outwards" in str(report)
 
 
 @pytest.mark.parametrize("what", ["settings", "mesh", "output", "record", "medium", "version"])
@@ -403,7 +403,7 @@ def test_no_scheduler_is_a_plain_error(tmp_path: Path, capsys: pytest.CaptureFix
     before = set(threading.enumerate())
     assert main(["bake", "bear", "--out-dir", str(tmp_path), "--dask", "not an address"]) == 1
     assert set(threading.enumerate()) <= before  # no loop goes on
-    assert capsys.readouterr().err.startswith("error: --dask not an address; no scheduler answers")
+    assert capsys.readouterr().err.startswith("error: --dask not an address; no scheduler answered")
 
 
 # Ctrl-C

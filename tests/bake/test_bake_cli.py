@@ -241,7 +241,7 @@ def test_an_open_mesh_is_baked_with_a_warning(run: Run, tmp_path: Path, make_bal
     opened.export(tmp_path / "open.obj")
     result = run(tmp_path / "open.obj", "-o", tmp_path / "t.npy", *QUICK)
     assert result.code == 0
-    assert "% of the rays left the mesh without an exit" in result.err
+    assert "% of the rays found no exit" in result.err
     assert json.loads(sidecar_of(tmp_path / "t.npy").read_text())["escaped"] > 0.01
 
 
@@ -297,7 +297,7 @@ def test_maps_that_cannot_be_right_are_suspect(
         assert result.code == 0, result.err
         rows = {row.split()[1]: row for row in result.out.splitlines()[:3]}
         assert [rows[f"{name}.obj"].split()[2] for name in ("whole", "opened", "sheet")] == [again, *2 * ["suspect"]]
-        assert re.search(r"\d+% of the rays have no exit, more than 0\.05", rows["opened.obj"])
+        assert re.search(r"\d+% of the rays found no exit, more than 5\.0%", rows["opened.obj"])
         assert "the thickness is 0 everywhere" in rows["sheet.obj"]
     found = json.loads(run(*arguments, "--max-escaped", "100%", "--json").out)
     assert [asset["status"] for asset in found["assets"]] == ["skipped", "skipped", "suspect"]

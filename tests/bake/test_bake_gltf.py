@@ -247,7 +247,10 @@ def test_objects_without_thickness_are_left_as_they_are(
 ) -> None:
     before = scene(tmp_path / "in.glb", 2, extensions=GLASS)
     told = write_maps(GlbBuilder(before), tmp_path / "out.glb", {(0, 0): make_map(0 * ramp), (1, 0): make_map(ramp)})
-    assert [one.get("warnings", []) for one in told["maps"]] == [["no thickness: its material is left as it is"], []]
+    assert [one.get("warnings", []) for one in told["maps"]] == [
+        ["the thickness is 0, so the material stays unchanged"],
+        [],
+    ]
     assert read_gltf(tmp_path / "out.glb").tree["meshes"][0] == before.tree["meshes"][0]
 
 
@@ -283,7 +286,7 @@ def test_thin_walls_without_an_inside_are_left_alone(scene: MapMaker, tmp_path: 
     primitive["indices"] = builder.add_accessor(corners.astype(np.uint32), INDICES)
     assert [target.key for target in find_targets(builder)] == [(1, 0)]
     builder.primitive(1, 0)["indices"] = primitive["indices"]
-    with pytest.raises(tl.InputError, match="thin walls without an inside: Ball 0, Ball 1"):
+    with pytest.raises(tl.InputError, match="only thin walls let light in, and they have no inside: Ball 0, Ball 1"):
         find_targets(builder)
     # With a volume it is meant to be solid; the bake tells how many rays escape.
     builder.tree["materials"][0]["extensions"]["KHR_materials_volume"] = {"thicknessFactor": 1}

@@ -173,7 +173,7 @@ def test_nodes_that_differ_in_size_are_told(vase: Vase, tmp_path: Path) -> None:
     bake_file(job)  # a node that hides it, and one that turns it
     file.tree["nodes"].append({"mesh": 0, "scale": [1, 1, 2]})
     (tmp_path / "a.gltf").write_text(json.dumps(file.tree))
-    with pytest.warns(tl.TranslucentWarning, match="nodes show 'Vase' in several sizes; its map is that of the first"):
+    with pytest.warns(tl.TranslucentWarning, match="nodes use 'Vase' in several sizes; the map fits only the first"):
         bake_file(job)
 
 
@@ -187,7 +187,7 @@ def test_new_uvs_are_written_beside_the_map(unwrap: bool, run: Run, vase: Vase, 
     result = run(model, "-o", out, *QUICK, "--check", *(["--unwrap"] if unwrap else []))
     assert result.code == 0, result.err
     beside = tmp_path / "t.npy.uv.glb"
-    assert f"{beside}: the model with the UVs that were made for this map\n" in result.out
+    assert f"{beside}: the model with new UVs for this map\n" in result.out
     for primitive, name in enumerate("AB"):
         found = values_on(beside, primitive, np.load(tmp_path / f"t-{name}.npy"))
         assert np.abs(found / MEAN - 1).max() < 0.03
@@ -222,7 +222,7 @@ def test_the_check_notices_a_map_of_other_uvs(vase: Vase, make_ball: Any, tmp_pa
     data, (_, uv) = path.read_bytes(), raw_uv(path, 1)
     own = np.column_stack([uv[:, 0], 1 - uv[:, 1]]).astype("<f4")
     path.write_bytes(data.replace(own.tobytes(), (0.25 + 0.5 * own).astype("<f4").tobytes()))
-    with pytest.raises(tl.RenderError, match=r"'Vase\[1\]'; \d+% of its vertices have other texture coordinates in"):
+    with pytest.raises(tl.RenderError, match=r"'Vase\[1\]'; \d+% of the vertices have other texture coordinates in"):
         check_output(job, record, results)
 
 

@@ -71,11 +71,12 @@ def test_the_command_writes_what_slicers_read(run: Run, tmp_path: Path) -> None:
     seen = seen[-20:]  # below the captions
     assert seen[:, :39] == pytest.approx(seen[:, 39:], abs=0.02)
     words = run(*how, "--color", "#7b1e3a", "--distance", "2mm").out
-    assert "rendered before an even white light" in words
-    assert "no medium; choose the material with --td, with --color and --distance, or with --preset" in one_error_line(
-        run(*how)
+    assert "in front of a uniform white light" in words
+    assert (
+        "no medium is given; choose the material with --td, with --color and --distance, or with --preset"
+        in one_error_line(run(*how))
     )
-    assert "--color or --preset is given, too" in one_error_line(run(*how, "--td", "3", "--preset", "amber"))
+    assert "--td and a medium are both given" in one_error_line(run(*how, "--td", "3", "--preset", "amber"))
     assert "needs two lengths; write for example" in one_error_line(run(*how, "--td", "3", "--thickness", "3"))
 
 
@@ -96,7 +97,7 @@ def test_the_command_writes_what_slicers_read(run: Run, tmp_path: Path) -> None:
             (THICK, THIN),
             0.1,
             0.001,
-            "3 mm to 0.6 mm thick, 100 mm wide, points every 1 mm; give a smallest thickness, a larger one, and a",
+            "3 mm to 0.6 mm thick, 100 mm wide, with a point every 1 mm; give a smallest thickness, a larger",
         ),
         (tl.Medium(500.0), (THIN, THICK), 0.1, 0.1, "a width of several points"),
         (tl.Medium(500.0), (THIN, THICK), 1.0, 1e-5, "use a larger --pitch: at most 4000000 points are allowed"),

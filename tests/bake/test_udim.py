@@ -96,7 +96,7 @@ def test_a_map_for_blender_is_in_metres_in_one_channel(run: Run, slab: Path, tmp
 
 def test_a_unit_that_looks_wrong_is_said(run: Run, slab: Path, tmp_path: Path) -> None:
     done = run("bake", slab, "-o", tmp_path / "a.png", "--unit", "100m", "--mode", "normal", *FAST)
-    assert "m thick: is the unit right?" in done.out
+    assert "m thick, too thick for most light: check --unit" in done.out
 
 
 @pytest.mark.parametrize(("off", "words"), [(0.02, "looks right"), (0.1, "looks similar"), (0.3, "looks different")])

@@ -215,7 +215,7 @@ def test_an_environment_is_a_picture_as_openexr_maps_directions(tmp_path: Path) 
         with OpenEXR.File(str(tmp_path / dome.GetTextureFileAttr().Get().path), separate_channels=True) as read:
             held = np.stack([read.channels()[name].pixels for name in "RGB"], axis=2)
         np.testing.assert_allclose(held, expected, rtol=1e-5)
-    with pytest.warns(tl.TranslucentWarning, match="a checkerboard environment: it is fixed to the picture"):
+    with pytest.warns(tl.TranslucentWarning, match="a checkerboard environment belongs to the picture"):
         tl.write_usd(
             dataclasses.replace(scene, environment=tl.Environment.checkerboard((1, 1, 1), (0, 0, 0))),
             tmp_path / "b.usda",

@@ -39,7 +39,7 @@ def test_notes_name_what_they_are_about() -> None:
         "thin leaf": "spikes and edges are",
         "neon": "light that the bodies emit and scatter is",
         "ball in soap": "the light around 'sphere' inside the bodies",
-        "cubes in and behind glass": "light that interfaces refract on its way to 'cube'",
+        "cubes in and behind glass": "'cube': up to 20 % too dark, without light that interfaces refract",
     }
     texts = {one.name: str(tl.plan(one.scene((0, 0)))) for one in SCENES}
     for name, word in words.items():

@@ -117,7 +117,7 @@ def broken(path: list[Any], value: Any) -> str:
     [
         (["seconds"], "long", r"seconds is 'long', not a number"),
         (["seconds"], True, r"seconds is True, not a number"),
-        (["cases", 0, "rows", 0, "wall", "median"], float("nan"), r"NaN is no JSON number"),
+        (["cases", 0, "rows", 0, "wall", "median"], float("nan"), r"NaN is not a JSON number"),
         (["cases", 0, "size"], [1, 2, 3], r"size is \[1, 2, 3\], not 2 values"),
         (["cases", 0, "quantity"], "mass", r"quantity is 'mass', not one of 'thickness'"),
         (["cases", 0, "rows", 1, "kind"], None, r"cases\[0\].rows\[1\].kind is missing"),

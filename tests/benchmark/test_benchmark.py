@@ -104,10 +104,11 @@ class TestMeasures:
             (lambda p: p[:, ::-1], "mirrored"),
             (lambda p: p[..., ::-1], "red and blue"),
             (srgb, "sRGB-encoded"),
-            (lambda p: 2.0 * p, "exposure may be off: at 1 stops darker"),
-            (lambda p: 0.5 * p, "exposure may be off: at 1 stops brighter"),
+            (lambda p: 2.0 * p, "exposure may be wrong: with 1 stops darker"),
+            (lambda p: 0.5 * p, "exposure may be wrong: with 1 stops brighter"),
             (lambda p: _zoomed(p, 1.25), "cropped"),
-            (lambda p: np.roll(p, 9, axis=1), "shifted by 9 pixels to the right and 0 down"),
+            (lambda p: np.roll(p, 9, axis=1), "shifted by 9 pixels to the right and 0 pixels down"),
+            (lambda p: np.roll(p, 9, axis=0), "shifted by 0 pixels to the right and 9 pixels down"),
         ],
     )
     def test_wrong_pictures_are_told_as_such(self, change: Any, said: str) -> None:

@@ -209,7 +209,7 @@ def test_an_absorber_that_scatters_a_little_has_its_thickness(
     assert found["thickness"] == pytest.approx(0.02, rel=0.04)
     assert found["transmittance"] == pytest.approx(merlot.medium.transmittance(found["thickness"]), rel=1e-4)
     notes = page.locator(".notes li").all_text_contents()
-    assert any("scattered in 'ball.ply'" in note for note in notes)
+    assert any("'ball.ply': scattered light is missing" in note for note in notes)
     preset = page.locator("#preset")
     chosen = "(field) => field.selectedOptions[0].text"
     assert preset.evaluate(chosen) == "merlot, as written"

@@ -65,7 +65,10 @@ READERS: dict[str, Callable[[Path], object]] = {
 @pytest.mark.parametrize(
     ("uri", "message"),
     [
-        ("../secret.bin", "leads outside the folder of the model; keep its files together, or say --allow-outside"),
+        (
+            "../secret.bin",
+            "leads outside the folder of the model; keep all files together, or add --allow-outside",
+        ),
         ("%2e%2e/secret.bin", "leads outside the folder of the model"),
         ("parts/../../secret.bin", "leads outside the folder of the model"),
         ("{}/secret.bin", "leads outside the folder of the model"),
@@ -151,7 +154,7 @@ def test_json_with_too_much_data_in_its_links_is_refused_unread(
 def test_a_small_file_unpacks_into_no_more_than_this() -> None:
     require_room("a", "b", reading.FREE, 0)
     require_room("a", "b", reading.FREE * 4, reading.FREE * 4 // reading.RATIO)
-    with pytest.raises(tl.InputError, match="a; 9 pixels take 2 GiB; of so small a file at most 1 GiB are read"):
+    with pytest.raises(tl.InputError, match="a; 9 pixels take 2 GiB; the limit for a file of this size is 1 GiB"):
         require_room("a", "9 pixels", reading.FREE * 4, reading.FREE * 2 // reading.RATIO)
 
 
@@ -230,14 +233,14 @@ def test_an_npz_that_claims_to_store_more_than_its_file_is_refused(tmp_path: Pat
     entry = data.rindex(b"PK\1\2", 0, data.rindex(b"offset.npy"))
     data[entry + 20 : entry + 24] = (2**30).to_bytes(4, "little")
     path.write_bytes(data)
-    with pytest.raises(tl.InputError, match="would take 1 GiB; of so small a file at most 512 MiB are read"):
+    with pytest.raises(tl.InputError, match="would take 1 GiB; the limit for a file of this size is 512 MiB"):
         load_thickness_map(path)
 
 
 def test_an_npz_that_unpacks_into_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reading, "FREE", 1000)
     np.savez_compressed(tmp_path / "a.npz", scale=np.array(1.0), offset=np.array(0.0), values=np.zeros((900, 900)))
-    with pytest.raises(tl.InputError, match=r"values would take 6.18 MiB; of so small a file at most"):
+    with pytest.raises(tl.InputError, match=r"values would take 6.18 MiB; the limit for a file of this size is"):
         load_thickness_map(tmp_path / "a.npz")
 
 
@@ -245,7 +248,7 @@ def test_an_archive_within_a_mesh_format_is_bounded(tmp_path: Path, monkeypatch:
     monkeypatch.setattr(reading, "FREE", 1000)
     with zipfile.ZipFile(tmp_path / "a.off", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("big", bytes(1_000_000))
-    with pytest.raises(tl.InputError, match="its parts take 977 kiB; of so small a file at most"):
+    with pytest.raises(tl.InputError, match="its parts take 977 kiB; the limit for a file of this size is"):
         tl.load_mesh(tmp_path / "a.off")
 
 
@@ -278,7 +281,7 @@ DEEP = "[" * 900 + "]" * 900
         ('{"a": ' * 150 + "1" + "}" * 150, "more than 100 levels"),
         ("9" * 5000, "a whole number is too long"),
         ("[1e999]", "1e999 is beyond the range of numbers"),
-        ("[NaN]", "NaN is no JSON number"),
+        ("[NaN]", "NaN is not a JSON number"),
         ("{", "Expecting property name"),
     ],
 )
@@ -327,10 +330,10 @@ def test_toml_that_no_reader_could_use(text: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"nodes": [{"mesh": 0, "children": [0]}]}, "nodes are their own parents"),
-        ({"nodes": [{"children": [1]}, {"mesh": 0, "children": [0]}]}, "nodes are their own parents"),
+        ({"nodes": [{"mesh": 0, "children": [0]}]}, "some nodes are their own ancestors"),
+        ({"nodes": [{"children": [1]}, {"mesh": 0, "children": [0]}]}, "some nodes are their own ancestors"),
         ({"extras": json.loads(DEEP)}, "the JSON of the file is broken .more than 100 levels"),
-        ({"buffers": [{"bufferView": 0}]}, "it has no binary chunk"),
+        ({"buffers": [{"bufferView": 0}]}, "the file has no binary chunk"),
     ],
 )
 def test_graphs_without_an_end_are_refused(tmp_path: Path, change: dict[str, Any], message: str) -> None:

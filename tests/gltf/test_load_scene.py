@@ -78,7 +78,7 @@ def test_primitives_are_objects_and_materials_of_one_name_stay_apart(tmp_path: P
 def test_what_a_scale_of_0_hides_is_left_out(tmp_path: Path) -> None:
     writer = box_file(tmp_path, name="Seen")
     writer.add("nodes", mesh=0, name="Hidden", scale=[0.0, 0.0, 0.0])
-    with pytest.warns(tl.TranslucentWarning, match=r"objects hidden by a scale of 0 \('Hidden'\)"):
+    with pytest.warns(tl.TranslucentWarning, match=r"objects with a scale of 0 \('Hidden'\)"):
         assert len(load(writer, tmp_path).objects) == 1
 
 

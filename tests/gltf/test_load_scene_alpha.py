@@ -56,7 +56,7 @@ def test_a_blended_material_that_covers_all_is_opaque(tmp_path: Path) -> None:
 
 def test_one_that_covers_nothing_is_hidden(tmp_path: Path) -> None:
     nothing = BLEND | {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0]}}
-    with pytest.raises(tl.InputError, match="its scene has no triangles"):
+    with pytest.raises(tl.InputError, match="the scene of the file has no triangles"):
         material_scene(tmp_path, nothing)
 
 
@@ -80,7 +80,7 @@ def test_masked_walls_have_holes_and_masked_solids_none(tmp_path: Path) -> None:
     solid = MASK | base_color() | {"extensions": glass(1.0, 1.0)}
     scene = tl.load_scene(plate(tmp_path, solid, CLEAR_HALF))
     assert scene.objects[0].surface.alpha_cutoff == 0.0
-    line = "holes of solids by alphaMode MASK, drawn closed (a solid with a hole has no inside) ('Stuff')"
+    line = "alphaMode MASK on solids: the holes are drawn closed, because a solid with holes has no inside ('Stuff')"
     assert scene.left_out == (line,)
 
 
@@ -88,7 +88,9 @@ def test_a_plan_says_that_solids_have_no_holes(tmp_path: Path) -> None:
     mesh = tl.Mesh(BOX.vertices, BOX.faces, colors=np.full((8, 4), 0.25), name="Crate")
     crate = tl.Object(mesh, tl.Medium(1.0), surface=tl.Surface(alpha_cutoff=0.5))
     plan = tl.plan(tl.Scene([crate], tl.Camera.look_at((0, 0, 20), (0, 0, 0))))
-    assert "holes by alpha_cutoff: 'Crate' drawn closed, since a solid with a hole has no inside" in plan.unmodelled
+    assert (
+        "'Crate': holes by alpha_cutoff are drawn closed, because a solid with holes has no inside" in plan.unmodelled
+    )
 
 
 @pytest.mark.parametrize(
@@ -130,7 +132,7 @@ def test_colors_tint_what_enters_a_body(tmp_path: Path) -> None:
 
 
 def test_as_many_colors_as_vertices(tmp_path: Path) -> None:
-    with pytest.raises(tl.InputError, match="'Box': 7 colors for 8 vertices"):
+    with pytest.raises(tl.InputError, match="mesh 'Box' has 7 colors, but 8 vertices"):
         colored(tmp_path, np.full((7, 3), 0.5))
     with pytest.raises(tl.InputError, match="a vertex color is outside 0 to 1"):
         tl.Mesh(BOX.vertices, BOX.faces, colors=np.full((8, 4), 1.5))

@@ -258,8 +258,8 @@ def test_a_steeper_normal_map_has_unit_normals(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("material", "tree", "line"),
     [
-        (base_color(texCoord=1), {}, "textures over TEXCOORD_1 ('Stuff')"),
-        (base_color(extensions={"KHR_texture_transform": {"texCoord": 2}}), {}, "textures over TEXCOORD_2 ('Stuff')"),
+        (base_color(texCoord=1), {}, "textures with TEXCOORD_1 ('Stuff')"),
+        (base_color(extensions={"KHR_texture_transform": {"texCoord": 2}}), {}, "textures with TEXCOORD_2 ('Stuff')"),
         (
             base_color(),
             {"textures": [{"extensions": {"KHR_texture_basisu": {"source": 0}}}]},
@@ -278,7 +278,7 @@ def test_what_is_not_read_of_textures_is_told(tmp_path: Path, material: Json, tr
 def test_filters_without_interpolation_are_told(tmp_path: Path) -> None:
     sampled = {"samplers": [{"magFilter": 9728}], "textures": [{"source": 0, "sampler": 0}]}
     path = plate(tmp_path, base_color(), png(PICTURE), **sampled)
-    with pytest.warns(tl.TranslucentWarning, match="nearest-neighbor filters"):
+    with pytest.warns(tl.TranslucentWarning, match="nearest-neighbor filtering"):
         assert tl.load_scene(path).objects[0].surface.color_texture is not None
 
 
@@ -292,7 +292,7 @@ def test_a_mesh_without_texture_coordinates_keeps_the_factors(tmp_path: Path) ->
 def test_large_pictures_are_made_smaller_and_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(images, "MAX_SIDE", 8)
     path = plate(tmp_path, base_color(), png(np.full((32, 16, 3), 77, np.uint8)))
-    with pytest.warns(tl.TranslucentWarning, match="pixels of textures beyond 8 along a side"):
+    with pytest.warns(tl.TranslucentWarning, match="full resolution of textures larger than 8 pixels along a side"):
         found = tl.load_scene(path).objects[0].surface.color_texture
     assert found.pixels.shape == (8, 4, 4)
     np.testing.assert_allclose(found.pixels[..., :3], srgb_to_linear(77 / 255), atol=1e-7)
@@ -319,7 +319,7 @@ def test_what_its_alpha_hides_is_left_out(tmp_path: Path) -> None:
     tree["meshes"].append({"primitives": [tree["meshes"][0]["primitives"][0] | {"material": 1}]})
     tree["nodes"].append({"mesh": 1, "name": "Seen"})
     path.write_text(json.dumps(tree))
-    with pytest.warns(tl.TranslucentWarning, match=r"objects hidden by their alpha \('Plate'\)"):
+    with pytest.warns(tl.TranslucentWarning, match=r"objects with an alpha of 0 \('Plate'\)"):
         assert [item.mesh.name for item in tl.load_scene(path).objects] == ["Seen"]
 
 
@@ -332,16 +332,16 @@ def test_what_its_alpha_hides_is_left_out(tmp_path: Path) -> None:
             "material 'Stuff': roughnessFactor 1.5 is not in 0..1",
         ),
         ({"pbrMetallicRoughness": {"metallicFactor": -1}}, None, "metallicFactor -1 is not in 0..1"),
-        ({"extensions": {"KHR_materials_ior": {"ior": 0.5}}}, None, "ior 0.5 is not 0, and not 1 or more"),
+        ({"extensions": {"KHR_materials_ior": {"ior": 0.5}}}, None, "the ior is 0.5, but must be 0, or at least 1"),
         (
             {"extensions": {DIFFUSE: {"diffuseTransmissionFactor": 2}}},
             None,
             "diffuseTransmissionFactor 2 is not in 0..1",
         ),
-        ({"alphaMode": "FOG"}, None, "alphaMode 'FOG' is none of glTF"),
+        ({"alphaMode": "FOG"}, None, "alphaMode 'FOG' is not defined in glTF"),
         ({"doubleSided": 1}, None, "doubleSided is 1, not true or false"),
-        (base_color(), None, "textures 0 is not one of 0"),
-        (base_color(index=3), b"", "textures 3 is not one of 1"),
+        (base_color(), None, "textures 0 does not exist: the file has 0"),
+        (base_color(index=3), b"", "textures 3 does not exist: the file has 1"),
         (base_color(texCoord=-1), b"", "texCoord is -1, not a whole number"),
     ],
     ids=lambda v: v if isinstance(v, str) else "",
@@ -390,7 +390,7 @@ def test_a_picture_in_a_missing_buffer_is_an_error(tmp_path: Path) -> None:
 
 def test_a_picture_beyond_all_measure_is_refused(tmp_path: Path) -> None:
     black = png(np.zeros((7000, 7000), np.uint8))
-    with pytest.raises(tl.InputError, match=r"7000x7000 pixels take 561 MiB; .* at most 512 MiB are read; make it sm"):
+    with pytest.raises(tl.InputError, match=r"7000x7000 pixels take 561 MiB; the limit .* is 512 MiB; use a sm"):
         tl.load_scene(plate(tmp_path, base_color(), black))
 
 

@@ -38,7 +38,7 @@ def test_a_repair_is_a_warning_as_it_is_of_load_mesh(tmp_path: Path) -> None:
     inverted = trimesh.Trimesh(BOX.vertices, BOX.faces[:, ::-1], process=False)
     writer.mesh(writer.primitive(inverted))
     writer.add("nodes", mesh=0, name="Box")
-    with pytest.warns(tl.TranslucentWarning, match=r"mesh 'Box': turned 1 closed part outwards"):
+    with pytest.warns(tl.TranslucentWarning, match=r"mesh 'Box': flipped 1 closed part outwards"):
         assert load(writer, tmp_path).objects[0].mesh.volume > 0
 
 

@@ -132,7 +132,7 @@ FLAT = [1.0, 0.0, 1.0]
 @pytest.mark.parametrize("kind", ["directional", "point", "spot"])
 @pytest.mark.parametrize("scale", [FLAT, [0.0, 0.0, 0.0]])
 def test_a_light_with_a_singular_transform_is_refused(tmp_path: Path, kind: str, scale: list[float]) -> None:
-    with pytest.raises(tl.InputError, match=r"light of node 'Lamp 0': its transform is singular .*; give every axis"):
+    with pytest.raises(tl.InputError, match=r"light of node 'Lamp 0': the transform is singular .*; use a scale"):
         lit_scene(tmp_path, {"type": kind}, scale=scale)
 
 
@@ -144,9 +144,7 @@ def test_a_camera_below_a_singular_transform_is_refused_unless_another_is_chosen
     writer.add("cameras", name="Lens", **PERSPECTIVE)
     writer.add("nodes", name="Crane", camera=0)
     writer.add("nodes", children=[1], scale=scale)
-    with pytest.raises(
-        tl.InputError, match=r"camera 'Lens' of node 'Crane': its transform is singular .*give every axis"
-    ):
+    with pytest.raises(tl.InputError, match=r"camera 'Lens' of node 'Crane': the transform is singular .*use a scale"):
         load(writer, tmp_path)
     assert load(writer, tmp_path, camera=None).camera.fov_y == 30.0
 

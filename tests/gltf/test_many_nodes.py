@@ -153,7 +153,7 @@ def test_a_mesh_that_nodes_share_is_looked_at_once(tmp_path: Path, monkeypatch: 
 def test_messages_name_the_first_of_many_objects() -> None:
     meshes = [tl.Mesh(OPEN.vertices, OPEN.faces, name=f"part {i}") for i in range(12)]
     text = str(plan(tl.Scene([body(DIAMOND, mesh, x=3.0 * i) for i, mesh in enumerate(meshes)], CAMERA)))
-    assert "'part 6', 'part 7' and 4 more: normal and place" in text
+    assert "'part 6', 'part 7' and 4 more: normal and position" in text
     assert "'part 8' and" not in text
     alike = str(plan(tl.Scene([body(DIAMOND, OPEN, x=3.0 * i) for i in range(12)], CAMERA)))
     assert alike.count("open edges") == 1

@@ -98,7 +98,7 @@ def test_a_black_channel_is_finite_and_said() -> None:
     medium = found.medium()
     np.testing.assert_allclose(medium.transmittance(2.0), (BLACKEST, 0.5, 1.0), rtol=1e-14)
     assert np.isfinite(medium.transmittance([0.0, 1e9])).all()
-    assert "attenuationColor red is 0, read as 1e-05" in found.warnings[0]
+    assert "attenuationColor red is 0 and was read as 1e-05" in found.warnings[0]
 
 
 def test_an_opaque_material_has_no_medium_however_thick() -> None:
@@ -130,7 +130,7 @@ def test_a_material_shows_its_name_and_its_colors() -> None:
         (volume(attenuationColor=[0.1, 0.2, 2]), "attenuationColor[2] 2 is not in 0..1"),
         (volume(attenuationDistance=0), "attenuationDistance 0 is not above 0"),
         (volume(attenuationDistance=-1), "attenuationDistance -1 is not above 0"),
-        (volume(thicknessTexture={"index": 3}), "thicknessTexture index 3 is not one of 0 textures"),
+        (volume(thicknessTexture={"index": 3}), "thicknessTexture has the index 3, but the file has 0 textures"),
         (volume(thicknessTexture=3), "thicknessTexture is 3, not an object"),
         (transformed(offset=[1]), "offset is [1], not two numbers"),
         (transformed(scale=["a", 1]), "scale[0] is 'a', not a number"),
@@ -139,7 +139,7 @@ def test_a_material_shows_its_name_and_its_colors() -> None:
         (volume(1.5), "transmissionFactor 1.5 is not in 0..1"),
         ({"extensions": {"KHR_materials_volume": 3}}, "KHR_materials_volume is 3, not an object"),
         ({"extensions": []}, "extensions is [], not an object"),
-        ({"extensions": {"KHR_materials_ior": {"ior": 0.5}}}, "ior 0.5 is not 0, and not 1 or more"),
+        ({"extensions": {"KHR_materials_ior": {"ior": 0.5}}}, "the ior is 0.5, but must be 0, or at least 1"),
         ({"extensions": {"KHR_materials_dispersion": {"dispersion": -1}}}, "dispersion -1 is not 0 or more"),
         ({"emissiveFactor": [1, 1]}, "emissiveFactor is [1, 1], not three numbers"),
     ],
@@ -352,9 +352,9 @@ def test_nodes_are_transformed_by_their_parents() -> None:
 @pytest.mark.parametrize(
     ("nodes", "message"),
     [
-        ([{"children": [0]}], "their own parents"),
+        ([{"children": [0]}], "their own ancestors"),
         ([{"children": [1, 1]}, {}], "two parents"),
-        ([{"children": [7]}], "nodes 7 is not one of 1"),
+        ([{"children": [7]}], "nodes 7 does not exist: the file has 1"),
         ([{"scale": [1, 2]}], "no valid transform"),
     ],
 )

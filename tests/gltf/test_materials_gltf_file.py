@@ -158,11 +158,17 @@ def test_compressed_views_and_their_empty_fallback_move_along(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"buffers": [{"uri": uri(b"123"), "byteLength": 9}]}, "buffer 0 should have 9 bytes and has 3"),
-        ({"buffers": [{"uri": uri(b"123")}]}, "buffer 0 should have None bytes"),
+        ({"buffers": [{"uri": uri(b"123"), "byteLength": 9}]}, "buffer 0 has 3 bytes, but should have 9"),
+        ({"buffers": [{"uri": uri(b"123")}]}, "buffer 0 has 3 bytes, but should have None"),
         ({"buffers": [{"uri": "none.bin", "byteLength": 9}]}, "'none.bin' cannot be read"),
-        ({"buffers": [{"uri": uri(b"123"), "byteLength": 3}], "bufferViews": [{"buffer": 1}]}, "view of buffer 1"),
-        ({"buffers": [{"uri": uri(b"123"), "byteLength": 3}], "bufferViews": [{"buffer": []}]}, "view of buffer"),
+        (
+            {"buffers": [{"uri": uri(b"123"), "byteLength": 3}], "bufferViews": [{"buffer": 1}]},
+            "view refers to buffer 1",
+        ),
+        (
+            {"buffers": [{"uri": uri(b"123"), "byteLength": 3}], "bufferViews": [{"buffer": []}]},
+            "view refers to buffer",
+        ),
         ({"images": [{"uri": "data:image/png;base64,!"}]}, "cannot be read"),
     ],
 )
@@ -195,7 +201,11 @@ def test_a_glb_holds_its_images_wherever_they_were(two_boxes: Path, tmp_path: Pa
     ("name", "content", "message"),
     [
         ("gone.png", None, "'gone.png' cannot be read.*; the image stays a link"),
-        ("secret.txt", b"root:x:0", "'secret.txt' is no picture that glTF knows; it stays a link"),
+        (
+            "secret.txt",
+            b"root:x:0",
+            "'secret.txt' is not a picture of a format that glTF supports; the image stays a link",
+        ),
     ],
 )
 def test_what_is_no_picture_is_not_copied(tmp_path: Path, name: str, content: bytes | None, message: str) -> None:
@@ -221,7 +231,7 @@ def test_broken_files_are_refused_in_one_line(two_boxes: Path, tmp_path: Path) -
         "json.glb": (whole.replace(b'"asset":', b'"asset";', 1), "the JSON of the file is broken ("),
         "old.glb": (whole[:4] + b"\1\0\0\0" + whole[8:], "GLB version 1"),
         "kind.glb": (whole[:16] + b"BIN\0" + whole[20:], "first chunk of the file is not JSON"),
-        "nan.gltf": (b'{"asset": {}, "materials": [{"a": NaN}]}', "NaN is no JSON number"),
+        "nan.gltf": (b'{"asset": {}, "materials": [{"a": NaN}]}', "NaN is not a JSON number"),
         "long.gltf": (b'{"asset": {}, "a": 1' + b"0" * 999 + b"}", "whole number is too long"),
         "huge.gltf": (b'{"asset": {}, "a": 1e999}', "beyond the range"),
         "deep.gltf": (b"[" * 100000, "the JSON of the file is broken ("),
@@ -249,12 +259,18 @@ def test_broken_files_are_refused_in_one_line(two_boxes: Path, tmp_path: Path) -
         ({"meshes": 3}, "meshes is not a list"),
         ({"meshes": [{}]}, "no list of primitives"),
         ({"meshes": [{"primitives": [{}]}]}, "no attributes"),
-        ({"meshes": [{"primitives": [{"attributes": {}, "material": []}]}]}, "materials \\[\\] is not one of 2"),
-        ({"meshes": [{"primitives": [{"attributes": {}, "material": 0}]}]}, "accessors None is not one of 1"),
+        (
+            {"meshes": [{"primitives": [{"attributes": {}, "material": []}]}]},
+            "materials \\[\\] does not exist: the file has 2",
+        ),
+        (
+            {"meshes": [{"primitives": [{"attributes": {}, "material": 0}]}]},
+            "accessors None does not exist: the file has 1",
+        ),
         ({"meshes": [{"primitives": [{"attributes": {}, "extensions": 3}]}]}, "KHR_materials_variants is malformed"),
-        ({"accessors": [{"max": [1, 2, 3]}]}, "positions without min and max"),
+        ({"accessors": [{"max": [1, 2, 3]}]}, "the positions have no min and max"),
         ({"extensionsUsed": 3}, "extensionsUsed is 3"),
-        ({"meshes": []}, "it has no mesh"),
+        ({"meshes": []}, "the file has no mesh"),
     ],
 )
 def test_a_malformed_scene_is_refused(two_boxes: Path, tmp_path: Path, change: Json, message: str) -> None:

@@ -129,7 +129,7 @@ def test_a_mesh_without_a_material_gets_one(two_boxes: Path, tmp_path: Path) -> 
 
 def test_what_gltf_cannot_hold_is_a_warning(two_boxes: Path, tmp_path: Path) -> None:
     milk = tl.Medium(absorption=1.0, scattering=2.0)
-    with pytest.warns(tl.TranslucentWarning, match="scattering is written as extinction"):
+    with pytest.warns(tl.TranslucentWarning, match="scattering is written as absorption"):
         write_medium(two_boxes, tmp_path / "out.glb", milk)
     np.testing.assert_allclose(read_materials(tmp_path / "out.glb")[0].medium().extinction, 3.0, rtol=1e-14)
 

@@ -253,18 +253,20 @@ def fake(limit: int) -> Any:
 
 def test_textures_that_do_not_fit_are_refused_before_they_are_built(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hierarchies, "build_hierarchy", None)
-    with pytest.raises(tl.RenderError, match=r"end at 2048 texels a side, .* use interfaces=tl.ScreenInterfaces\(\)$"):
+    with pytest.raises(
+        tl.RenderError, match=r"this OpenGL allows 2048 texels along a side, .* use interfaces=tl.ScreenInterfaces\(\)$"
+    ):
         SceneHierarchies(fake(2048), [ball()], 1)
     # Thirty million triangles, of which only the number is asked for.
     crowd: Any = SimpleNamespace(faces=np.broadcast_to(np.int32(0), (30_000_000, 3)))
-    with pytest.raises(tl.RenderError, match=r"at least 119,999,992 texels, .* holds 67,108,864; .* coarser meshes"):
+    with pytest.raises(tl.RenderError, match=r"at least 119,999,992 texels, .* allows 67,108,864; .* coarser meshes"):
         SceneHierarchies(fake(16384), [crowd], 1)
 
 
 def test_textures_that_turn_out_not_to_fit_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_require_room", lambda gl, meshes: None)
     monkeypatch.setattr(module, "_MOST_ROWS", 2)
-    with pytest.raises(tl.RenderError, match="texels, and this OpenGL holds 8,192"):
+    with pytest.raises(tl.RenderError, match="texels, but this OpenGL allows 8,192"):
         SceneHierarchies(fake(16384), [ball()], 1)
 
 

@@ -135,7 +135,7 @@ def test_what_was_interrupted_says_so() -> None:
         engine = renderer.gpu
         with interrupted_at(8), pytest.raises(KeyboardInterrupt):
             picture(renderer)
-        with pytest.raises(tl.RenderError, match=r"^rendering; it was interrupted; create a new renderer$"):
+        with pytest.raises(tl.RenderError, match=r"^rendering; the renderer was interrupted; create a new renderer$"):
             engine.render(renderer.plan(SCENE), SIZE)
         assert renderer.gpu is not engine
 

@@ -148,7 +148,7 @@ def test_the_processors_paint_the_same_layers() -> None:
     with tl.Renderer(backend="cpu") as renderer:
         frame = renderer.render(scene, SIZE)
     assert frame.radiance[MIDDLE] == pytest.approx(0.25 * RED + 0.75 * LEFT * (0.5 * BLUE + 0.5), abs=1e-6)
-    assert "what layers mirror: 'mesh' show diffuse light alone" in frame.plan.unmodelled
+    assert "'mesh': these layers reflect only diffusely" in frame.plan.unmodelled
 
 
 # Vertex colors, holes, glow, occlusion
@@ -263,7 +263,7 @@ def test_a_file_is_drawn_as_viewers_do(renderer: tl.Renderer, tmp_path: Path) ->
     ]
     tree["meshes"][0]["primitives"][0]["material"] = 0
     path.write_text(json.dumps(tree))
-    with pytest.warns(tl.TranslucentWarning, match="alphaMode BLEND, drawn as thin sheets"):
+    with pytest.warns(tl.TranslucentWarning, match="alphaMode BLEND: partly transparent layers"):
         scene = tl.load_scene(path)
     frame = render(renderer, *scene.objects)
     assert frame.radiance[MIDDLE] == pytest.approx(0.25 * RED + 0.75, abs=1e-6)

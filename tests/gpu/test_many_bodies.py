@@ -113,7 +113,7 @@ def test_tiles_beyond_those_that_are_compared_throw_shadows(monkeypatch: pytest.
 def test_more_bodies_over_one_another_than_traced_rays_know_of_are_named(renderer: tl.Renderer) -> None:
     at = trimesh.transformations.translation_matrix
     boxes = [tl.Object(BOX, tl.Medium(absorption=1.0, ior=1.5), at((0, 0, 0.01 * i))) for i in range(INTERIOR_SIZE + 1)]
-    with pytest.warns(tl.TranslucentWarning, match=f"more than {INTERIOR_SIZE} bodies over one another"):
+    with pytest.warns(tl.TranslucentWarning, match=f"more than {INTERIOR_SIZE} bodies at once"):
         renderer.render(tl.Scene(boxes, tl.Camera.look_at((0.3, 0.2, 5), (0, 0, 0))), (8, 8))
     renderer.render(tl.Scene(boxes[1:], tl.Camera.look_at((0.3, 0.2, 5), (0, 0, 0))), (8, 8))
 

@@ -116,7 +116,7 @@ def test_the_planner_looks_at_the_lights_only_where_a_medium_scatters(renderer: 
     assert [step.name for step in renderer.plan(dark, scattering=ONCE).passes] == ["signed_depth", "transmittance"]
     clear = tl.Scene([tl.Object(BALL, tl.Medium(absorption=1.0))], lit.camera, lit.lights, BLACK)
     assert [step.name for step in renderer.plan(clear).passes] == ["signed_depth", "transmittance"]
-    assert renderer.plan(lit, tl.DepthPeeling()).unmodelled[0].startswith("in-scattered light")
+    assert renderer.plan(lit, tl.DepthPeeling()).unmodelled[0].startswith("this method leaves out the light")
     assert "more than once" in renderer.plan(lit).unmodelled[0]
 
 
@@ -328,7 +328,7 @@ def test_numbers_at_the_limits_stay_finite(renderer: tl.Renderer) -> None:
 def test_a_method_that_leaves_scattered_light_out_says_so(renderer: tl.Renderer) -> None:
     scene = ball_scene(LIGHTS["side"], 3.0)
     for method in (tl.SignedDepth(), tl.DepthPeeling()):
-        with pytest.warns(tl.TranslucentWarning, match="this method leaves out light that media scatter into rays"):
+        with pytest.warns(tl.TranslucentWarning, match="this method leaves out the light that media scatter into rays"):
             renderer.render(scene, SIZE, method)
 
 

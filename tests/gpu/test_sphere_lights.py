@@ -161,7 +161,7 @@ def test_light_in_smoke(renderer: tl.Renderer, follows: None) -> None:
     assert frame.valid.all()
     assert np.abs(off).max() <= 0.02
     assert abs(off.mean()) <= 5e-3
-    told = "8 points each, and not of 16: no more than 8 lights are followed into media"
+    told = "shadows of 8 point lights, not of 16, because at most 8 lights can shine into media"
     assert any(told in note for note in frame.plan.unmodelled)
 
 

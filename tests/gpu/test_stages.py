@@ -111,7 +111,7 @@ def test_the_ground_mirrors_what_a_mirrored_eye_sees(
     camera = tl.Camera.look_at(eye, target, fov_y=40)
     scene = tl.Scene([dataclasses.replace(ball, transform=lift), ground], camera, environment=sky)
     with_image = renderer.render(scene, SIZE)
-    assert "'mesh' mirrors what stands on it, once" in str(with_image.plan)
+    assert "'mesh' reflects the objects on it, once" in str(with_image.plan)
     with monkeypatch.context() as patch:
         patch.setattr("translucent.gpu.job.mirror_of", lambda scene: None)
         without = renderer.render(scene, SIZE)

@@ -127,7 +127,7 @@ def test_a_large_picture_is_written_in_tiles(run: Run, tmp_path: Path, monkeypat
     assert tiled["thickness"] == pytest.approx(whole["thickness"], rel=1e-4)
     refused = run(*arguments, tmp_path / "aov.exr", "--aov", tmp_path / "aov")
     assert refused.code == 2
-    assert "48x40 pixels, which are written in tiles" in refused.err
+    assert "48x40 pixels are rendered in tiles" in refused.err
 
 
 def test_an_interrupted_picture_leaves_no_file(renderer: tl.Renderer, tmp_path: Path) -> None:

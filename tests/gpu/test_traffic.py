@@ -118,13 +118,13 @@ def test_it_is_told_in_words_and_as_json() -> None:
     scene = balls(1)
     told = frame_traffic(tl.plan(scene))
     assert str(told).splitlines() == [
-        "bytes in targets at most, of one sample:",
-        "  signed_depth: 0 read, 8 written per pixel and 8 read, 8 written for each face over it",
+        "largest number of bytes read and written in render targets, for one sample:",
+        "  signed_depth: 0 read, 8 written per pixel and 8 read, 8 written for each face over the pixel",
         "  transmittance: 8 read, 20 written per pixel",
         "  together: 8 read, 28 written per pixel, and 16 read back",
     ]
     shown = dataclasses.replace(told, passes=(*told.passes, PassTraffic(PassName.CAUSTICS)))
-    assert str(shown).splitlines()[-1] == "  not counted, since it depends on what rays hit: caustics"
+    assert str(shown).splitlines()[-1] == "  not counted, because it depends on the rays: caustics"
     assert shown.summary() == {
         "passes": [
             {"name": "signed_depth", "pixel": {"read": 0, "written": 8}, "face": {"read": 8, "written": 8}},

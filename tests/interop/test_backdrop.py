@@ -172,9 +172,9 @@ def test_the_plan_says_where_opaque_objects_come_from(renderer: tl.Renderer) -> 
     scene = bodies_of(with_objects(PERSPECTIVE))
     chosen = renderer.plan(scene, over_backdrop=True)
     assert [step.name for step in chosen.passes] == ["shadow_maps", "backdrop", "signed_depth", "transmittance"]
-    assert "1. shadow_maps: 1 light on the picture drawn elsewhere" in str(chosen)
-    assert "2. backdrop: opaque objects are a picture drawn elsewhere" in str(chosen)
-    assert "not modelled: shadows that the objects in the backdrop cast onto media" in str(chosen)
+    assert "1. shadow_maps: 1 light on the backdrop" in str(chosen)
+    assert "2. backdrop: a backdrop (a picture with depth) replaces opaque objects" in str(chosen)
+    assert "approximation: objects in the backdrop cast no shadows onto media" in str(chosen)
     assert chosen == plan_over_backdrop(scene)
     assert "backdrop" not in str(renderer.plan(scene))
 
@@ -192,8 +192,8 @@ def test_bad_backdrops_are_refused() -> None:
         ((radiance, nan), "the depth is not above 0 in 4 pixels; .* and inf for pixels without a surface"),
         ((radiance, 0.0 * depth), "the depth is not above 0 in 20 pixels"),
         (("red", depth), "the values of radiance are not numbers"),
-        ((radiance, depth, depth), r"coverage of shape \(4, 5\) and type float64"),
-        ((radiance, depth, depth[0] > 0), r"coverage of shape \(5,\)"),
+        ((radiance, depth, depth), r"the coverage has the shape \(4, 5\) and the type float64"),
+        ((radiance, depth, depth[0] > 0), r"the coverage has the shape \(5,\)"),
         ((np.ones((0, 5, 3)), np.ones((0, 5))), r"the depth has shape \(0, 5\)"),
     ):
         with pytest.raises(tl.InputError, match=message):

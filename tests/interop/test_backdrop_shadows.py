@@ -150,4 +150,4 @@ def test_the_plan_counts_the_views_from_lights() -> None:
     shown = scene([SUN, LAMP], SKY, "perspective", environment_shadows=4)
     step = plan_over_backdrop(shown).passes[0]
     assert (step.name, step.geometry_passes) == ("shadow_maps", 6)
-    assert "2 lights and 4 directions of the environment on the picture drawn elsewhere" in step.reason
+    assert "2 lights and 4 directions of the environment on the backdrop" in step.reason

@@ -41,7 +41,7 @@ def test_pyrender_draws_the_opaque_objects_of_a_file(pyrender: ModuleType, run: 
         with np.load(output) as file:
             arrays[name] = dict(file)
     assert "opaque objects: pyrender 0.1.45 through arrays" in out
-    assert "2. backdrop: opaque objects are a picture drawn elsewhere" in out
+    assert "2. backdrop: a backdrop (a picture with depth) replaces opaque objects" in out
     own, drawn = arrays["own"], arrays["pyrender"]
     np.testing.assert_allclose(drawn["thickness"], own["thickness"], atol=1e-5)
     red_box = (own["radiance"][..., 0] > 3 * own["radiance"][..., 1]) & (own["transmittance"] == 1).all(axis=-1)

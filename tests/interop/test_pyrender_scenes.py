@@ -174,7 +174,7 @@ def test_unknown_names_are_told_with_those_there_are(studio: Any) -> None:
 def test_nameless_nodes_are_told(pyrender: ModuleType, studio: Any) -> None:
     scene = pyrender.Scene()
     scene.add(studio.mesh(studio.ball, (1, 1, 1)))
-    with pytest.raises(tl.InputError, match=r"the scene has no names: give nodes some, scene.add\(mesh, name=\.\.\.\)"):
+    with pytest.raises(tl.InputError, match=r"the scene has no names: use scene.add\(mesh, name=\.\.\.\)"):
         scene_from_pyrender(scene, {"ball": GREEN}, SIZE)
 
 

@@ -255,7 +255,7 @@ def test_json_holds_all_of_it(medium: tl.Medium) -> None:
         ('{"absorbtion": 1}', "the JSON has the unknown keys absorbtion"),
         ('{"ior": "glass"}', "the value of ior is 'glass', and not a number"),
         ('{"absorption": [1, 2]}', "the value must be one or three numbers"),
-        ('{"absorption": NaN}', "NaN is no JSON number"),
+        ('{"absorption": NaN}', "NaN is not a JSON number"),
     ],
 )
 def test_bad_json_is_refused(text: str, message: str) -> None:
@@ -288,7 +288,7 @@ def test_files_of_other_systems_are_loaded(tmp_path: Path, name: str, target: st
         (
             "a.glb",
             "",
-            "suffix '.glb'; give a .json, .mtlx, .py, .js, .gdshader, .txt, .cs, .usda file; of glTF, translucent",
+            "suffix '.glb'; give a .json, .mtlx, .py, .js, .gdshader, .txt, .cs, .usda file; for glTF, see translucent",
         ),
         ("a.mtlx", "<materialx><open_pbr_surface>", "a.mtlx'; OpenPBR document; the XML of the file is broken ("),
         ("a.mtlx", "<materialx/>", "a.mtlx'; Standard Surface document; the file has no element <standard_surface>"),

@@ -69,9 +69,9 @@ def test_a_path_opens_a_file_or_shows_a_folder(folder: Path) -> None:
     assert shown.accept() == str(folder / "a.glb")
     shown.text = str(folder / "none.glb")
     assert shown.accept() is None
-    assert shown.problem == "none.glb: no such file"
+    assert shown.problem == "none.glb: this file does not exist"
     shown.enter("/no/such/place")
-    assert "no such folder" in shown.problem
+    assert "this folder does not exist" in shown.problem
     assert shown.folder == folder / "Models"
     shown.text = "a\0b"
     assert shown.accept() is None
@@ -89,7 +89,7 @@ def test_a_file_is_written_over_only_if_that_is_confirmed(folder: Path) -> None:
     assert shown.accept() is None, "another file is another question"
     shown.text = "nowhere/b.glb"
     assert shown.accept() is None
-    assert "no such folder" in shown.problem
+    assert "this folder does not exist" in shown.problem
 
 
 def test_a_folder_that_is_gone_is_told(folder: Path) -> None:
@@ -129,7 +129,7 @@ def test_environments_of_a_folder(tmp_path: Path, state: Any) -> None:
     (tmp_path / "empty").mkdir()
     shown.take(str(tmp_path / "empty"))
     assert shown.files() == []
-    assert "no .hdr, .exr, .pic is here" in shown.problem
+    assert "no file with the suffix .hdr or .exr or .pic in this folder" in shown.problem
     shown.take(str(tmp_path / "gone"))
     assert (shown.files(), "No such file" in shown.problem) == ([], True)
     assert (title(""), title("studio"), title(str(tmp_path / "a.HDR"))) == ("own", "studio", "a")
@@ -233,7 +233,7 @@ def test_of_ten_dropped_files_one_model_and_one_environment_are_taken(state: Any
     assert state.get("look.environment") == str(skies[0])
     assert state.environments.files() == [str(path) for path in skies]
     (told,) = state.work.messages
-    assert told.text.startswith("8 dropped files are left out")
+    assert told.text.startswith("8 dropped files are ignored")
 
 
 def test_of_a_folder_of_500_environments_few_are_read_in_a_frame(

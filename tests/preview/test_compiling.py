@@ -267,7 +267,7 @@ def test_what_looks_like_the_material_is_on_show_until_its_picture_is_compiled(
         assert view.draw(work, SIZE)
         work.update()
     assert "preparing the picture" in [task.name for task in work.busy]
-    assert view.state == "preparing the new picture: a stand-in"
+    assert view.state == "preparing the new picture; a simple preview is visible"
     stood = pixels(view)
     np.testing.assert_array_equal(stood[:, :8], before[:, :8])
     assert view.draw(work, (2 * SIZE[0], 2 * SIZE[1]))  # larger now, and still a stand-in
@@ -385,7 +385,7 @@ def test_interfaces_are_those_of_the_screen_until_another_process_has_the_hierar
     mesh = work.loaded.scene.objects[0].mesh
     work.do(ChoosePreset("merlot"))
     view.draw(work, SIZE)
-    assert "Preparing reflections in the mesh" in view.quality.notes[0]
+    assert "The mesh is being prepared for ray tracing" in view.quality.notes[0]
     assert isinstance(view.quality.request.interfaces, tl.ScreenInterfaces)
     assert not has_packed(mesh)
     near.set()
@@ -469,7 +469,7 @@ def test_programs_of_media_that_scatter_are_compiled_before_one_is_chosen(
     for _ in range(2):
         view.foresee(work)
     grid = "diffuses (Diffusion(resolution=12)) in 1 body"
-    assert requested == [("", ["leaves as from layers in 1 body", grid])]  # once, and nobody waits for it
+    assert requested == [("", ["leaves as from flat layers in 1 body", grid])]  # once, and nobody waits for it
     work.do(ChoosePreset("wax"))
     monkeypatch.undo()
     finish(view, work)

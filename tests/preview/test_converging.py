@@ -36,7 +36,7 @@ def test_a_still_picture_converges_until_something_changes(
     while view.draw(work, SIZE):
         told.append(view.paths.note)
     assert view.problem == ""
-    assert "converging: the first paths" in told
+    assert "tracing the first paths" in told
     assert any(text.startswith("converging: 4 paths, standard error ") for text in told)
     assert view.paths.note.startswith("converged: 16 paths")
     scene = work.scene()
@@ -55,7 +55,7 @@ def test_a_still_picture_converges_until_something_changes(
 
     monkeypatch.setattr(Pool, "call", call)
     work.do(SetField("display.denoise", True))
-    wait(work, lambda: not view.draw(work, SIZE) and "denoised at 16 paths" in view.paths.note)
+    wait(work, lambda: not view.draw(work, SIZE) and "denoised after 16 paths" in view.paths.note)
     np.testing.assert_allclose(given[0], truth.radiance, rtol=1e-3, atol=1e-4)
     assert (pixels(view) == pixels(view)[0, 0]).all(), "what the denoiser made is on show"
     work.do(SetField("display.denoise", False))

@@ -50,7 +50,7 @@ def test_the_window_has_another_process_write(work: Workspace, tmp_path: Path) -
     work.export(str(path), write_picture, SCENE, SIZE)
     assert [task.name for task in work.busy if task.name.startswith("writing")] == ["writing a.png"]
     work.export(str(tmp_path / "b.png"), write_picture, SCENE, SIZE)
-    assert "b.png' has not been written yet; writing a.png is under way" in work.messages[-1].text
+    assert "b.png' has not been written yet; another task is still running: writing a.png" in work.messages[-1].text
     wait(work, lambda: work.lanes["write"].task is None)
     assert work.messages[-1].text == f"wrote {path}"
     with Image.open(path) as image:

@@ -59,7 +59,7 @@ def test_an_object_is_isolated_and_the_last_one_is_not_hidden(work: Workspace) -
     wait(work, lambda: bool(found))
     assert found == [1], "it is told by its number in the model"
     state.hide(1)
-    assert "the only one on show" in work.messages[-1].text
+    assert "no other object is visible" in work.messages[-1].text
     shot = Recipe(work.document, loaded, scene, (48, 32))
     assert "hidden objects" in command_line(shot)[1]
     assert "if i not in [0, 2]" in python_code(shot)

@@ -160,7 +160,7 @@ def test_photons_in_media_are_followed_aside(
 
     with view.current():
         assert not ready()
-        assert found.note == "caustics: photons in media first"
+        assert found.note == "caustics: tracing photons in media"
         assert found.show_media(view.viewport) is None
         wait(work, lambda: lane.task is None)
         assert not ready()

@@ -81,7 +81,7 @@ def test_slow_traced_interfaces_wait_until_the_view_is_still(
     for _ in range(2):
         work.do(OrbitBy(20.0, 10.0))
         assert view.draw(work, SIZE)
-        assert ("Rough reflections while the picture moves" in view.simpler) is slow
+        assert ("Approximate reflections while the view moves" in view.simpler) is slow
     assert [plan.interfaces for plan in drawn] == 2 * [tl.ScreenInterfaces() if slow else usual]
     finish(view, work)
     assert (view.simpler, view.plans[0].interfaces) == ("", usual)

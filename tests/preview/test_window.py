@@ -186,7 +186,7 @@ def test_the_window_does_what_a_script_says(preview, tmp_path: Path) -> None:  #
     assert told["model"] == "leaf"
     texts = {kind: [m["text"] for m in told["messages"] if m["kind"] == kind] for kind in ("info", "warning", "error")}
     assert len(texts["error"]) == 2
-    assert "the only one on show" in texts["error"][0]
+    assert "no other object is visible" in texts["error"][0]
     assert "bad.glb" in texts["error"][1]
     assert f"wrote {picture}" in texts["info"]
     assert "color = [" in session.read_text()

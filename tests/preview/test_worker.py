@@ -150,7 +150,7 @@ def test_processes_run_when_nobody_else_wants_to_unless_the_picture_waits(
 
 
 def test_a_process_that_dies_is_told_and_the_next_one_begins(task: Task, pool: Pool) -> None:
-    with pytest.raises(tl.RenderError, match=r"baking; its process ended with status 9"):
+    with pytest.raises(tl.RenderError, match=r"baking; the worker process ended with status 9"):
         pool.call(task, dies)
     assert pool.call(task, pid) != os.getpid()
 

@@ -51,10 +51,8 @@ def test_the_planner_adds_it_and_says_so() -> None:
     found = plan(scene(MILK))
     assert found.method == tl.SignedDepth()
     assert found.exact
-    assert "closed form, q / sigma_t (1 - T); of the ambient radiance A" in found.passes[-1].reason
-    assert found.unmodelled == (
-        "shadows in ambient light: ambient light reaches every point of the media without attenuation",
-    )
+    assert "closed form, q / sigma_t (1 - T); media emit the ambient radiance A" in found.passes[-1].reason
+    assert found.unmodelled == ("ambient light reaches every point of the media without shadows or attenuation",)
     several = plan(scene(MILK, tl.Medium(absorption=1.0)))
     assert several.ordered
     assert "emission among several media" in several.passes[0].reason

@@ -84,7 +84,12 @@ def test_refusals(tmp_path: Path) -> None:
         ("spin.gif", float("nan"), frames(), "nan pictures per second"),
         ("spin.gif", 24, iter(()), "animation; the animation has no frames"),
         ("spin.gif", 24, [np.zeros((2, 2, 3), np.uint8), np.zeros((2, 3, 3), np.uint8)], r"frame 1 .*\(2, 3, 3\)"),
-        ("spin.gif", 24, [np.zeros((2, 2, 3))], "frame 0 of an animation; shape .* and type float64"),
+        (
+            "spin.gif",
+            24,
+            [np.zeros((2, 2, 3))],
+            "frame 0 of an animation; the frame has the shape .* and the type float64",
+        ),
     ]:
         with pytest.raises(tl.InputError, match=message):
             write_animation(tmp_path / name, pictures, fps)

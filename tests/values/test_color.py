@@ -96,7 +96,7 @@ def test_a_color_can_be_written_so(written: object, linear: tuple[float, ...]) -
     [
         ("reddish", "color 'reddish'; the text is neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)"),
         ("#12345", "color '#12345'; the text is neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)"),
-        ("", "color ''; the text is empty; a shell takes #... for a comment: quote it, '#7b1e3a', or leave the # out"),
+        ("", "color ''; the text is empty; in a shell, quote the color: '#7b1e3a' (# begins a comment)"),
         ("123", "color '123'; the text is neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)"),
         ("7b1e3aff", "color '7b1e3aff'; the text is neither a hex color, a CSS name, srgb(r,g,b) nor linear(r,g,b)"),
         ("0.1,0.2,0.3", "neither a hex color"),

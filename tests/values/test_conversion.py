@@ -193,16 +193,16 @@ def test_labels_of_swatches_are_escaped() -> None:
     ("color", "distance", "words"),
     [
         ((0.2, 0.5, 0.9), 0.02, []),
-        ((1, 0.5, 0.5), 0.02, ["red is 1 (saturated)"]),
+        ((1, 0.5, 0.5), 0.02, ["red is 1, so the medium absorbs nothing of it"]),
         (
             (0.5, 0.99, 0.5),
             0.02,
-            ["green 0.99 is near white: rounding it to 8 bits changes its extinction by up to 44 %"],
+            ["green 0.99 is near white: rounding to 8 bits changes the extinction by up to 44 %"],
         ),
         ((0.5, 0.5, 5e-4), 0.02, ["blue 0.0005 is near black"]),
         ((0.2, 0.5, 0.9), 2e-6, ["the distance 2e-06 m is outside 1e-05 to 100 m"]),
         ((0.2, 0.5, 0.9), 101, ["outside"]),
-        ((1e-30,) * 3, 1, ["red", "green", "blue", "nearly black at a tenth"]),
+        ((1e-30,) * 3, 1, ["red", "green", "blue", "nearly black even at a tenth"]),
         ((0.995,) * 3, 1, ["red", "green", "blue", "nearly clear even at ten times"]),
     ],
 )
@@ -356,8 +356,8 @@ def test_pixels_that_cannot_be_picked(tmp_path: Path) -> None:
         ("print.tif@0,0", "the pixel format"),
         ("deep.tif@0,0", "the pixel format RGB of 16 bits is not supported"),
         ("gray_alpha.png@0,0", r"the pixel format is not supported \("),
-        ("text.png@0,0", "not an image that can be read"),
-        ("cut.png@0,0", "not an image that can be read"),
+        ("text.png@0,0", "the file is not a readable image"),
+        ("cut.png@0,0", "the file is not a readable image"),
         ("none.png@0,0", "no file has this path; check the path"),
         (".@0,0", "pixel 0,0 of"),
     ]:

@@ -91,7 +91,7 @@ def test_the_diagnosis_of_a_hand_made_mesh(mesh: Mesh, differs: dict[str, object
         (Mesh(CORNERS, DOUBLED), "4 unreferenced vertices (first: vertex 4, 5, 6)"),
         (Mesh(CORNERS, np.vstack([CUBE, [[0, 3, 3]]])), "1 faces of zero area (first: face 12)"),
         (Mesh(WITH_NAN, CUBE), "1 non-finite vertices (first: vertex 7)"),
-        (Mesh(CORNERS, CUBE[:, ::-1]), "inverted: all faces look inwards"),
+        (Mesh(CORNERS, CUBE[:, ::-1]), "inverted: all faces point inwards"),
     ],
 )
 def test_a_problem_is_told_with_its_count_and_first_offenders(mesh: Mesh, problem: str) -> None:

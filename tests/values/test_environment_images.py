@@ -170,7 +170,7 @@ def test_png_files_are_decoded(tmp_path: Path) -> None:
     exact = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     np.testing.assert_allclose(found, exact, rtol=1e-6)
     (tmp_path / "broken.png").write_bytes(b"\x89PNG nothing")
-    with pytest.raises(tl.InputError, match=r"broken.png'; it is not an image that can be read"):
+    with pytest.raises(tl.InputError, match=r"broken.png'; the file is not a readable image"):
         tl.Environment.image(tmp_path / "broken.png")
 
 

@@ -108,9 +108,9 @@ def test_a_photographed_wedge(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "no column 'distance': it is empty"),
+        ("", "no column 'distance': the file is empty"),
         ("distance,color\n", "no rows; add at least one row"),
-        ("distance,r,g\n1,1,1\n", "no column 'color' or 'b': its first line says distance, r, g"),
+        ("distance,r,g\n1,1,1\n", "no column 'color' or 'b': the first line is distance, r, g"),
         (
             "distance,color\n1,red\n",
             r"wedge.csv line 2: fit to color \[1.0, 0.0, 0.0\]; a channel of the color is not above 0",

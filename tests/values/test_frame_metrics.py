@@ -227,7 +227,7 @@ def test_a_mask_narrows_the_comparison() -> None:
     off = frame(thickness=frame().thickness * 2)
     errors = tl.compare(off, frame(), mask=mask)
     assert (errors.pixels, errors.max) == (1, 1.0)
-    assert errors.mask == "covered and valid in both, within the given mask"
+    assert errors.mask == "covered and valid in both, and inside the mask"
 
 
 def test_what_cannot_be_compared_is_refused() -> None:

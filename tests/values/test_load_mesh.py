@@ -123,7 +123,7 @@ def test_the_nodes_of_a_scene_become_one_mesh_in_their_places(tmp_path: Path) ->
 
 def test_one_flipped_face_is_turned_back_with_a_warning(tmp_path: Path) -> None:
     path = save(tmp_path / "cube.off", Mesh(CORNERS, changed(CUBE, flip=4)))
-    with pytest.warns(tl.TranslucentWarning, match=re.escape("'cube.off': turned 1 of 12 faces to agree with")):
+    with pytest.warns(tl.TranslucentWarning, match=re.escape("'cube.off': flipped 1 of 12 faces to match their")):
         mesh = load_mesh(path)
     assert facts(mesh.diagnosis) == CLEAN
     assert mesh.volume == 1.0
@@ -131,10 +131,10 @@ def test_one_flipped_face_is_turned_back_with_a_warning(tmp_path: Path) -> None:
 
 def test_a_body_inside_out_is_turned_outwards_with_a_warning(tmp_path: Path) -> None:
     path = save(tmp_path / "cube.off", inverted(cube()))
-    with pytest.warns(tl.TranslucentWarning, match=re.escape("mesh 'cube.off': turned 1 closed part outwards")):
+    with pytest.warns(tl.TranslucentWarning, match=re.escape("mesh 'cube.off': flipped 1 closed part outwards")):
         mesh = load_mesh(path)
     assert mesh.volume == 1.0
-    assert mesh.repairs == ("turned 1 closed part outwards",)
+    assert mesh.repairs == ("flipped 1 closed part outwards",)
 
 
 def test_a_cavity_stays_a_cavity(tmp_path: Path) -> None:
@@ -196,7 +196,7 @@ def test_a_uv_seam_survives_welding(tmp_path: Path) -> None:
         ("garbage.off", b"\x00\xff" * 200, "the file cannot be read ("),
         ("points.obj", b"v 0 0 0\nv 1 0 0\n", "the mesh has no faces; use a mesh of triangles, not of points or lines"),
         ("nan.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "1 vertices are not finite (first: 0)"),
-        ("huge.obj", b"v 0 0 1e30\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "beyond 1e+18 m"),
+        ("huge.obj", b"v 0 0 1e30\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "beyond the limit of 1e+18 m"),
     ],
 )
 def test_such_a_file_is_refused(tmp_path: Path, name: str, content: bytes | None, message: str) -> None:
@@ -257,7 +257,7 @@ def test_a_part_in_the_hole_of_a_ring_is_no_cavity_and_a_shell_in_a_ball_is(tmp_
     inverted = Mesh(ball.vertices, ball.faces[:, ::-1])
     assert joined(ring, inverted).diagnosis.inside_out_parts == 1
     assert "1 closed parts inside out" in joined(ring, inverted).diagnosis.problems
-    with pytest.warns(tl.TranslucentWarning, match="turned 1 closed part outwards"):
+    with pytest.warns(tl.TranslucentWarning, match="flipped 1 closed part outwards"):
         mended = load_mesh(save(tmp_path / "ring.ply", joined(ring, inverted)))
     assert mended.volume == pytest.approx(ring.volume + ball.volume, rel=1e-6)
     shell = joined(Sphere().tessellate(24), inverted)
@@ -275,7 +275,7 @@ def test_many_parts_are_oriented_in_one_go(tmp_path: Path) -> None:
     """Every part inside out, 1500 of them: no loop over all parts for each part."""
     ball = Sphere(radius=0.3).tessellate(4)
     parts = [Mesh(ball.vertices + (i % 40, i // 40, 0.0), ball.faces[:, ::-1]) for i in range(1500)]
-    with pytest.warns(tl.TranslucentWarning, match="turned 1500 closed parts outwards"):
+    with pytest.warns(tl.TranslucentWarning, match="flipped 1500 closed parts outwards"):
         assert load_mesh(save(tmp_path / "parts.ply", joined(*parts))).diagnosis.solid
 
 
@@ -285,7 +285,7 @@ def test_parts_are_compared_with_those_around_them_alone(monkeypatch: pytest.Mon
     places = [(i % 20 + 0.01 * i, i // 20, 0.1 * (i % 7)) for i in range(400)]
     apart = [Mesh(one.vertices + at, one.faces[:, ::-1]) for at in places for one in (ball, inner)]
     monkeypatch.setattr(winding, "MOST_PAIRS", 20 * sum(len(part.faces) for part in apart))  # of 2,400,000 per part
-    with pytest.warns(tl.TranslucentWarning, match="turned 400 closed parts outwards"):
+    with pytest.warns(tl.TranslucentWarning, match="flipped 400 closed parts outwards"):
         assert mended(joined(*apart)).volume == pytest.approx(400 * (ball.volume - inner.volume))
     bubbles = [Box((-1, -1, -1), (30, 30, 2)).tessellate(1), *apart[::2]]
     assert mended(joined(*bubbles)).repairs == ()
@@ -294,7 +294,7 @@ def test_parts_are_compared_with_those_around_them_alone(monkeypatch: pytest.Mon
 def test_parts_that_all_lie_one_in_another_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(winding, "MOST_PAIRS", 1000)
     nested = [Sphere(radius=i).tessellate(4) for i in range(1, 40)]
-    with pytest.raises(tl.InputError, match="39 of them that look inwards lie one in another"):
+    with pytest.raises(tl.InputError, match="39 parts with faces that point inwards are nested"):
         mended(joined(*(inverted(one) for one in nested)))
 
 

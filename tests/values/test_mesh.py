@@ -189,7 +189,7 @@ def test_a_mesh_keeps_its_own_read_only_arrays() -> None:
     [
         (np.nan, "2 vertices are not finite (first: 1)"),
         (-np.inf, "2 vertices are not finite (first: 1)"),
-        (2 * MAX_COORDINATE, "a coordinate of 2e+18 m, beyond 1e+18 m; give the file's unit"),
+        (2 * MAX_COORDINATE, "a coordinate is 2e+18 m, beyond the limit of 1e+18 m; state the unit of the file"),
     ],
 )
 def test_coordinates_that_cannot_be_drawn_are_refused(value: float, message: str) -> None:

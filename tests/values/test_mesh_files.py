@@ -118,11 +118,11 @@ def test_the_diagnosis_of_a_nasty_file(assets: Path, name: str, expected: dict[s
 @pytest.mark.parametrize(
     ("name", "repair", "volume"),
     [
-        ("fandisk_inverted.obj", "turned 1 closed part outwards", 20.244),
-        ("sphere_inverted.obj", "turned 1 closed part outwards", 4.047),
-        ("multibody.stl", "turned 6 of 32 faces to agree with their neighbors; turned 2 closed parts outwards", None),
-        ("openscad-nonmanifold-crash.obj", "turned 1 of 1442 faces to agree", 451.96),
-        ("spider_binary.stl", "turned 4 of 1368 faces to agree", None),
+        ("fandisk_inverted.obj", "flipped 1 closed part outwards", 20.244),
+        ("sphere_inverted.obj", "flipped 1 closed part outwards", 4.047),
+        ("multibody.stl", "flipped 6 of 32 faces to match their neighbors; flipped 2 closed parts outwards", None),
+        ("openscad-nonmanifold-crash.obj", "flipped 1 of 1442 faces to match", 451.96),
+        ("spider_binary.stl", "flipped 4 of 1368 faces to match", None),
     ],
 )
 def test_the_winding_of_a_nasty_file_is_mended_aloud(
@@ -142,7 +142,7 @@ def test_the_winding_of_a_nasty_file_is_mended_aloud(
     [
         ("empty.stl", "the mesh has no faces"),
         ("points_bin.ply", "the mesh has no faces; use a mesh of triangles, not of points"),
-        ("huge_Cray_right.obj", "a coordinate of 3.4e+38 m, beyond 1e+18 m"),
+        ("huge_Cray_right.obj", "a coordinate is 3.4e+38 m, beyond the limit of 1e+18 m"),
     ],
 )
 def test_a_nasty_file_that_cannot_be_used_is_refused(assets: Path, name: str, message: str) -> None:
@@ -168,5 +168,5 @@ def test_every_nasty_file_loads_or_is_refused_in_one_line(assets: Path) -> None:
 
 def test_a_box_at_the_limit_of_float32_loads_with_its_unit(assets: Path) -> None:
     # 3.4e38 um would still be 3.4e32 m; nothing but a scale of the file helps, and nothing overflows on the way.
-    with pytest.raises(tl.InputError, match=r"a coordinate of 3.4e\+32 m"):
+    with pytest.raises(tl.InputError, match=r"a coordinate is 3.4e\+32 m"):
         load_mesh(assets / "meshes_nasty" / "huge_Cray_right.obj", unit="um")

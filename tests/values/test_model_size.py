@@ -36,12 +36,12 @@ def test_files_without_a_unit_say_what_was_assumed(tmp_path: Path) -> None:
 
 
 def test_the_unit_is_guessed_from_format_and_extents(tmp_path: Path) -> None:
-    assert likely_unit(80.0, ".STL") == ("mm", "an .stl is mostly in millimetres")
-    assert likely_unit(199.2, ".off") == ("mm", "199 metres are rare, and millimetres are not")
+    assert likely_unit(80.0, ".STL") == ("mm", ".stl files usually use millimetres")
+    assert likely_unit(199.2, ".off") == ("mm", "a size of 199 metres is unusual, and millimetres are common")
     # Of models that were scaled to 1 or 10, and of an .stl that would be a millimetre, nothing is known.
     assert likely_unit(1.7, ".obj") is likely_unit(10.0, ".obj") is likely_unit(1.0, ".stl") is None
     note = size_note(tl.load_mesh(_file(tmp_path, "part.stl", 40.0)))
-    assert note == "80 m tall; taken as metres; an .stl is mostly in millimetres: --unit mm makes it 8 cm tall"
+    assert note == "80 m tall; taken as metres; .stl files usually use millimetres: --unit mm makes it 8 cm tall"
 
 
 def test_meshes_are_scaled_to_a_height_or_their_longest_side(tmp_path: Path) -> None:
@@ -68,11 +68,8 @@ def test_bodies_of_many_mean_free_paths_look_opaque(times: float, said: bool) ->
     found = _remarks(0.5e-3 * times, medium)
     assert [note.kind for note in found] == [NoteKind.OPAQUE_BODIES] * said
     if said:
-        assert "opaque at this size, as plastic: light turns back within 1 mm" in found[0]
-        assert (
-            "5 cm tall (--height 5cm) light would shine through its thin parts; so it would if the medium were"
-            in found[0]
-        )
+        assert "opaque at this size, like plastic: the mean free path is 1 mm" in found[0]
+        assert "5 cm tall (--height 5cm) light would shine through thin parts, or with --dilute" in found[0]
 
 
 @pytest.mark.parametrize(("times", "said"), [(0.3, True), (0.4, False)])

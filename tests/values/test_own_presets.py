@@ -69,7 +69,7 @@ def test_own_presets_are_found_by_name_and_listed(folder: Path, run: Run) -> Non
     for name, words in (
         ("bad", "your own preset of this name cannot be read"),
         ("tea", "your own preset of this name cannot be read"),
-        ("cup", "are not all read"),
+        ("cup", "one of your own presets could not be read"),
     ):
         told = run("presets", "show", name).err
         assert words in told

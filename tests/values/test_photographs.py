@@ -121,13 +121,13 @@ def test_dust_counts_for_nothing_and_light_that_falls_off_is_no_noise() -> None:
 def test_what_is_no_line_and_photographs_that_differ_are_told() -> None:
     picture = photograph(np.random.default_rng(3))
     flare = Photograph(picture + 0.05, WHITE, PATCHES)
-    assert "red falls off less than exponentially, as if light is scattered" in fit_photographs([flare]).warnings[0]
+    assert "red falls off less than exponentially, as with multiple scattering" in fit_photographs([flare]).warnings[0]
     darker = Photograph(picture - 0.1, WHITE, PATCHES[:3])
     assert any("more than exponentially" in line for line in fit_photographs([darker]).warnings)
     curved = Photograph(picture**1.2, WHITE, PATCHES)
     told = fit_photographs([Photograph(picture, WHITE, PATCHES), curved]).warnings
-    assert "red differs by 18 % between photograph 1 and photograph 2: is a camera's tone curve" in told[0]
-    for count, words in ((1, "one thickness: the reflection of its faces"), (2, "two thicknesses")):
+    assert "red differs by 18 % between photograph 1 and photograph 2, perhaps by the tone curve" in told[0]
+    for count, words in ((1, "with one thickness, reflection"), (2, "two thicknesses")):
         few = fit_photographs([Photograph(picture, WHITE, PATCHES[:count])])
         assert len(few.warnings) == 1
         assert words in few.warnings[0]
@@ -137,7 +137,7 @@ def test_what_is_no_line_and_photographs_that_differ_are_told() -> None:
 def test_steps_that_are_named_in_reverse_are_told(ior: float | None) -> None:
     reverse = [(where, float(d)) for (where, _), d in zip(PATCHES, STEPS[::-1], strict=True)]
     with pytest.raises(
-        tl.InputError, match=r"every channel is brighter where the plate is thicker.*in their order from the left"
+        tl.InputError, match=r"all channels become brighter where the plate is thicker.*list the thicknesses from left"
     ):
         fit_photographs([Photograph(photograph(np.random.default_rng(3)), WHITE, reverse)], ior)
 
@@ -192,7 +192,7 @@ def test_a_toml_file_names_photographs(tmp_path: Path) -> None:
         (WHITE, [((0, 9, SIDE, SIDE), 0.001)], 0.8, "the rectangle lies outside the picture of 144 x 24 pixels"),
         (WHITE, [((-1, 0, SIDE, SIDE), 0.001)], 0.8, "the rectangle lies outside the picture of"),
         (WHITE, [((0, 0, 3, 9), 0.001)], 0.8, "3 x 9 pixels; use a rectangle of at least 4 x 4 pixels"),
-        (PATCHES[1][0], PATCHES, 0.8, "patch 24,0,24,24 of steps.png; red .* is above the white's"),
+        (PATCHES[1][0], PATCHES, 0.8, "patch 24,0,24,24 of steps.png; red .* is brighter than the white rectangle"),
         (
             WHITE,
             PATCHES,

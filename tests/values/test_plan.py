@@ -134,41 +134,61 @@ def test_convex_is_what_back_face_depth_is_exact_for() -> None:
             [body()],
             None,
             0,
-            "1 body in one unsorted draw each: distances where rays leave, minus those where they enter, add up to thi",
+            "1 body in one unsorted draw each: distances of exits minus distances of entries add up to thi",
         ),
         (
             [body(), body(WINE)],
             None,
             0,
-            "2 bodies in one unsorted draw each: distances where rays leave, minus those where",
+            "2 bodies in one unsorted draw each: distances of exits minus",
         ),
         ([body()], None, -1, "Beer-Lambert: what is behind, through exp(-optical depth)"),
-        ([body(FIRE)], None, -1, "Beer-Lambert, and the emission of the one medium in closed form, q / sigma_t (1 - T"),
+        (
+            [body(FIRE)],
+            None,
+            -1,
+            "Beer-Lambert, plus the emission of the single medium in closed form, q / sigma_t (1 - T",
+        ),
         (
             [body(FIRE), body(WINE)],
             None,
             -1,
-            "Beer-Lambert: what is behind, through exp(-optical depth), and what the i",
+            "Beer-Lambert: light from behind the media, times exp(-optical depth), plus the",
         ),
-        ([sheet()], None, 0, "every face of 1 mesh is a sheet: their paths add up, t / max(0.001, n.v) each"),
-        ([sheet(), sheet()], None, 0, "every face of 2 meshes is a sheet: their paths add up"),
-        ([body(), sheet()], None, 1, "1 mesh declared thin: paths through faces add up, t / max(0.001, n.v) each"),
+        (
+            [sheet()],
+            None,
+            0,
+            "every face of 1 mesh is a sheet: their path lengths are summed, t / max(0.001, n.v) each",
+        ),
+        ([sheet(), sheet()], None, 0, "every face of 2 meshes is a sheet: their path lengths are summed"),
+        (
+            [body(), sheet()],
+            None,
+            1,
+            "1 mesh, thin-walled: the path lengths through all faces are summed, t / max(0.001, n.v) each",
+        ),
         (
             [body(), body(None)],
             None,
             0,
-            "1 opaque object: depth and color of the nearest, where rays through the media",
+            "1 opaque object: depth and color of the nearest surface, where rays through",
         ),
         ([body(), body(None), body(None)], None, 0, "2 opaque objects: depth and color of the nearest"),
         ([body()], tl.BackFaceDepth(), 0, "requested: nearest front face, then farthest back face"),
-        ([body(mesh=OPEN), body()], None, 2, "closed bodies, in the same pixels"),
+        ([body(mesh=OPEN), body()], None, 2, "thickness of the closed bodies, in the pixels of the open bodies"),
         ([body(FIRE), body(WINE)], None, 0, "emission among several media: a medium dims the emission behind it; one "),
-        ([body()], tl.FragmentLists(), 0, "requested; one draw into a list for each pixel, sorted afterwards"),
+        ([body()], tl.FragmentLists(), 0, "requested; one draw fills a list for each pixel, which is then sorted"),
         ([body()], tl.KBuffer(5), 0, "requested; one draw; each pixel keeps the 5 nearest surfaces"),
-        ([body()], tl.DepthPeeling(), 0, "requested; two layers with each draw, until all are found"),
-        ([body()], tl.DepthPeeling(8), 0, "requested; two layers with each draw"),
-        ([body()], tl.DepthPeeling(order="front-to-back"), 0, "requested; a layer with each draw, until all are found"),
-        ([body()], tl.DepthPeeling(order="back-to-front"), 0, "requested; a layer with each draw"),
+        ([body()], tl.DepthPeeling(), 0, "requested; each draw finds two layers, until none is left"),
+        ([body()], tl.DepthPeeling(8), 0, "requested; each draw finds two layers"),
+        (
+            [body()],
+            tl.DepthPeeling(order="front-to-back"),
+            0,
+            "requested; each draw finds one layer, until none is left",
+        ),
+        ([body()], tl.DepthPeeling(order="back-to-front"), 0, "requested; each draw finds one layer"),
     ],
 )
 def test_a_pass_says_why_the_scene_needs_it(objects: list[tl.Object], method: Any, step: int, reason: str) -> None:
@@ -182,9 +202,12 @@ def test_a_last_pass_speaks_of_emission_only_where_there_is_some() -> None:
 @pytest.mark.parametrize(
     ("objects", "cause"),
     [
-        ([body(), body(mesh=TORUS, x=0.5)], "'box' and 'torus' may overlap, and a sum would count both; one draw into"),
+        (
+            [body(), body(mesh=TORUS, x=0.5)],
+            "'box' and 'torus' may overlap, and a sum would count both; one draw fills",
+        ),
         ([body(x=9), body(), body(mesh=TORUS, x=0.5)], "'box' and 'torus' may overlap, and a sum would count both"),
-        ([body(x=9), body(mesh=TORUS)], "'torus' may overlap itself, and a sum would count it twice; one draw into a"),
+        ([body(x=9), body(mesh=TORUS)], "'torus' may overlap itself, and a sum would count it twice; one draw fills a"),
     ],
 )
 @pytest.mark.parametrize("overlap", ["union", "priority"])
@@ -220,7 +243,7 @@ def test_the_order_of_three_media_does_not_hide_a_difference() -> None:
     assert not plan(scene(body(GLASS), body(None), body(GLASS))).spectral
 
 
-# A picture drawn elsewhere, in place of opaque objects
+# A backdrop in place of opaque objects
 
 
 @pytest.mark.parametrize(
@@ -229,7 +252,7 @@ def test_the_order_of_three_media_does_not_hide_a_difference() -> None:
 def test_a_backdrop_is_a_pass_before_all_others(objects: list[tl.Object], method: Any) -> None:
     found, alone = plan_over_backdrop(scene(*objects), method), plan(scene(*objects), method)
     assert found.passes[0].name == "backdrop"
-    assert "drawn elsewhere" in found.passes[0].reason
+    assert "replaces opaque objects" in found.passes[0].reason
     assert (found.passes[1:], found.method, found.limits) == (alone.passes, alone.method, alone.limits)
     assert found.cost > alone.cost
     assert found.geometry_passes == alone.geometry_passes
@@ -287,10 +310,10 @@ def test_a_plan_prints_a_line_for_each_thing_to_know() -> None:
     assert [line.split(":")[0].strip() for line in lines[1:]] == [
         *(f"{i}. {step.name}" for i, step in enumerate(found.passes, 1)),
         *["limit"] * len(found.limits),
-        *["not modelled"] * len(found.unmodelled),
+        *["approximation"] * len(found.unmodelled),
     ]
-    text = "shadows of the environment: its light reaches opaque objects as if nothing was in the way, so that"
-    assert lines[-1].startswith(f"  not modelled: {text}")
+    text = "the environment casts no shadows on opaque objects, so a ground is up to twice as bright beside"
+    assert lines[-1].startswith(f"  approximation: {text}")
     assert str(plan(scene(body()))).startswith("SignedDepth(anchored=True): exact, at about the cost of ")
 
 

@@ -37,10 +37,10 @@ def test_photons_land_on_the_picture_of_what_is_opaque() -> None:
     assert found.cost - plan(scene()).cost == pytest.approx(FEW.cost_of_a_million * 1e-3)
     assert (found.caustics, found.summary()["caustics"]) == (FEW, "Caustics(photons=1000, seed=0)")
     notes = [str(note) for note in found.unmodelled if note.kind is NoteKind.CAUSTICS]
-    assert notes[0] == "caustics of light of the environment"
+    assert notes[0] == "the environment causes no caustics"
     assert len(notes) == 2
     milk = plan(scene(body(tl.Medium(1.0, 50.0, ior=1.4)), body(None, 3.0)), caustics=FEW)
-    assert "caustics in media that scatter: 'box'" in str(milk)
+    assert "no caustics in these scattering media: 'box'" in str(milk)
 
 
 def test_photons_that_read_no_textures_are_told() -> None:
@@ -56,7 +56,7 @@ def test_photons_that_read_no_textures_are_told() -> None:
         ([body(), fog], Capabilities(), False),
     ):
         notes = plan(scene(*objects), capabilities=machine, caustics=FEW).unmodelled
-        assert any("textures of interfaces" in str(note) for note in notes) == told
+        assert any("ignore the textures of these interfaces" in str(note) for note in notes) == told
 
 
 def test_photons_light_fog() -> None:
@@ -67,10 +67,10 @@ def test_photons_light_fog() -> None:
     assert found.method == tl.RayMarched(64)
     assert not found.has(PassName.CAUSTICS)
     (views,) = (step for step in found.passes if step.name is PassName.LIGHT_VIEWS)
-    assert "requested: 250,000 photons, followed on the processor" in views.reason
-    assert "carry what 'box' bends into 'box', about 12 s" in views.reason
-    assert "caustics in media that scatter" not in str(found)
-    assert "photons that media scatter" in str(found)
+    assert "requested: 250,000 photons carry light through" in views.reason
+    assert "carry light through 'box' into 'box'; the CPU traces them in about 12 s" in views.reason
+    assert "no caustics in these scattering media" not in str(found)
+    assert "photons that a medium scatters are lost" in str(found)
     both = plan(scene(body(), fog, body(None, 3.0)), caustics=FEW)
     assert both.has(PassName.CAUSTICS)
     assert plan(scene(body(), fog), caustics=FEW).caustics.in_media == 65_536  # type: ignore[union-attr]
@@ -83,36 +83,34 @@ def test_photons_light_bodies_that_scatter_behind_interfaces() -> None:
     assert (found.treated(Treatment.DIFFUSION), found.opaque_to_shadows) == ((1,), {0, 1})
     (traced,) = (step for step in found.passes if step.name is PassName.TRACED)
     assert "250,000 photons" in traced.reason
-    assert "caustics in media that scatter" not in str(found)
+    assert "no caustics in these scattering media" not in str(found)
     alone = plan(scene(milk, body(None, 3.0)), caustics=FEW)
-    assert "followed on the processor" not in str(alone)
-    assert "caustics in media that scatter: 'box'" in str(alone)
+    assert "the CPU traces them" not in str(alone)
+    assert "no caustics in these scattering media: 'box'" in str(alone)
 
 
 def test_without_opengl_photons_land_where_opaque_objects_are_shaded() -> None:
     found = plan(scene(), capabilities=Capabilities(shader_storage=False, opengl=False), caustics=FEW)
     assert "photons from 1 light" in found.passes[-1].reason
-    assert "followed on the processor" in found.passes[-1].reason
-    assert not [note for note in found.unmodelled if "objects that are seen only through interfaces" in note]
+    assert "the CPU traces them" in found.passes[-1].reason
+    assert not [note for note in found.unmodelled if "objects that are visible only through interfaces" in note]
 
 
 def test_fog_that_photons_do_not_light_is_told() -> None:
     fog, ground = body(tl.Medium(scattering=2.0), 1.0), body(None, 3.0)
     once = plan(scene(body(), fog, ground), scattering=tl.SingleScattering(), caustics=FEW)
-    assert "caustics in media that scatter: 'box'" in str(once)
+    assert "no caustics in these scattering media: 'box'" in str(once)
     # Without steps that gather it, light leaves through the surface of fog, where photons come in.
     old = plan(scene(body(), fog, ground), capabilities=Capabilities(shader_storage=False), caustics=FEW)
     assert old.treated(Treatment.DIFFUSION) == (1,)
-    assert "bends into 'box'" in str(old)
+    assert "carry light through 'box' into 'box'" in str(old)
     ahead = plan(scene(body(), body(tl.Medium(scattering=2.0, anisotropy=0.5), 1.0)), caustics=FEW)
-    assert "directions in which 'box' scatters caustics: equally bright in all directions" in str(ahead)
+    assert "'box': caustic light is scattered equally in all directions" in str(ahead)
 
 
 def test_a_plan_names_the_option_that_shows_the_light_in_a_shadow() -> None:
     """The plan names `--caustics` for a light, a clear refracting body and a receiver, as long as photons are off."""
-    offered = (
-        "the bright spot in the shadow of 'box', several times as bright as the ground, and the dark around the spot"
-    )
+    offered = "the caustic in the shadow of 'box' is missing, a spot several times as bright as the ground"
     assert any(offered in note and "--caustics" in note for note in plan(scene()).unmodelled)
     others = [
         scene(lights=()),
@@ -121,8 +119,8 @@ def test_a_plan_names_the_option_that_shows_the_light_in_a_shadow() -> None:
         scene(body(tl.Medium(1.0, 50.0, ior=1.4)), body(None, 3.0)),
         scene(body(sheet_thickness=0.01), body(None, 3.0)),
     ]
-    assert not any("bright spot" in str(plan(other)) for other in others)
-    assert "bright spot" not in str(plan(scene(), caustics=FEW))
+    assert not any("the caustic in the shadow" in str(plan(other)) for other in others)
+    assert "the caustic in the shadow" not in str(plan(scene(), caustics=FEW))
 
 
 def test_pictures_of_many_samples_have_caustics() -> None:
@@ -143,7 +141,7 @@ def test_pictures_of_many_samples_have_caustics() -> None:
     wax = body(tl.Medium(1.0, 50.0, ior=1.4), 5.0)
     assert photons(16, scene(body(), body(None, 3.0), wax)) == photons(16, scene(body())) == 0.0
     text = str(plan_scene(scene(), RenderRequest(samples=32, pixels=10_000)))
-    assert "in less than 33% of the time of the picture" in text
+    assert "photons take less than 33% of the time of the picture" in text
 
 
 def test_nobody_gets_caustics_unasked() -> None:
@@ -168,10 +166,14 @@ def test_what_bends_light_stops_it_on_its_straight_way() -> None:
             {},
             "caustics; the scene has no lights that can emit photons; add a tl.PointLight, tl.SpotLight or",
         ),
-        (scene(body(tl.Medium(1.0)), body(None, 3.0)), {}, "caustics; no interface of 'box' bends or mirrors light"),
-        (scene(body()), {}, "caustics; no opaque object receives the light, and no other body scatters it"),
+        (
+            scene(body(tl.Medium(1.0)), body(None, 3.0)),
+            {},
+            "caustics; no interface of 'box' refracts or reflects light",
+        ),
+        (scene(body()), {}, "caustics; no opaque object and no scattering body can receive the light"),
         (scene(), {"method": tl.PathTraced()}, "omit the caustics, or choose another method"),
-        (scene(), {"method": tl.ThinLayer()}, "it treats every face as a sheet, which refracts no light"),
+        (scene(), {"method": tl.ThinLayer()}, "this method treats every face as a sheet, which does not refract light"),
         (
             scene(body(density=tl.LinearDensity(1, 0.0, 1.0)), body(None, 3.0)),
             {},
@@ -180,7 +182,7 @@ def test_what_bends_light_stops_it_on_its_straight_way() -> None:
         (
             scene(body(sheet_thickness=1e-3, surface=tl.Surface(roughness=0.5)), body(None, 3.0)),
             {},
-            "'box': a sheet that is rough; use a closed body instead of the sheet, or a sheet without roughness",
+            "'box': photons cannot cross a rough sheet; use a closed body instead of the sheet",
         ),
     ],
 )
@@ -195,7 +197,7 @@ def test_numbers_of_photons_that_make_no_sense_are_refused(photons: Any) -> None
         tl.InputError, match=r"Caustics photons .*; the value must be a whole number in 0 to 1073741824"
     ):
         tl.Caustics(photons)
-    with pytest.raises(tl.InputError, match=r"caustics 7; not tl\.Caustics; give for example tl.Caustics"):
+    with pytest.raises(tl.InputError, match=r"caustics 7; this is not tl\.Caustics; give for example tl.Caustics"):
         plan(scene(), caustics=7)  # type: ignore[arg-type]
     with pytest.raises(tl.InputError, match="Caustics seed -1"):
         tl.Caustics(seed=-1)

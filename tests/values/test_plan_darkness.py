@@ -34,8 +34,8 @@ def test_the_remark_tells_thickness_what_passes_and_what_would_show_it() -> None
     found = plan(scene(body(INK)))
     # exp(-2 ln 255), and ln 5 / sigma, which is a factor of 2 ln 255 / ln 5.
     assert found.remarks == (
-        "'box': black: 1.5e-05 of white light passes 667 mm, the mean thickness, and a fifth passes 96.8 mm; diluted "
-        "6.9 times (--dilute 6.9) it shows its color",
+        "'box': black: only 1.5e-05 of white light passes 667 mm, the mean thickness; a fifth passes 96.8 mm; diluted "
+        "6.9 times (--dilute 6.9), the color becomes visible",
     )
     assert str(found).splitlines()[-1] == f"  remark: {found.remarks[0]}"
     assert found.summary()["remarks"] == list(found.remarks)

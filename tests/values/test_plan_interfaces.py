@@ -57,7 +57,7 @@ def test_one_interface_saves_a_draw_and_says_what_it_costs(method: Any) -> None:
     assert front.cost < both.cost
     assert ONE_INTERFACE in front.unmodelled
     assert tuple(note for note in front.unmodelled if note != ONE_INTERFACE) == both.unmodelled
-    assert "not modelled: FrontInterface: rays refract only where they enter a body" in str(front)
+    assert "approximation: FrontInterface: rays refract only where they enter a body" in str(front)
     assert front.summary()["interfaces"] == "FrontInterface()"
 
 
@@ -132,7 +132,7 @@ def test_an_eye_in_the_hole_of_a_ring_is_outside() -> None:
     ],
 )
 def test_what_is_no_choice_of_interfaces_is_refused(asked: Any, do: str) -> None:
-    message = f"^{re.escape(f'interfaces {asked!r}; not a choice of interfaces; {do}')}$"
+    message = f"^{re.escape(f'interfaces {asked!r}; this is not a choice of interfaces; {do}')}$"
     for make in (plan, plan_over_backdrop, planned_on_the_cpu):
         with pytest.raises(tl.InputError, match=message):
             make(scene(body()), interfaces=asked)
@@ -155,7 +155,7 @@ def test_sheets_have_one_interface_and_bend_no_ray(objects: list[tl.Object], met
     assert found["interfaces"].reason.endswith("normal and position of the first sheet on each ray")
     assert found["interfaces"].geometry_passes == 1
     assert (
-        found["surfaces"].reason == "interfaces mirror the environment (ior above 1); rays go straight through sheets"
+        found["surfaces"].reason == "interfaces reflect the environment (ior above 1); rays go straight through sheets"
     )
     solid = {step.name: step for step in plan(scene(body(DIAMOND)), interfaces=SCREEN).passes}
     assert solid["interfaces"].geometry_passes == 2
@@ -225,13 +225,13 @@ def test_traced_interfaces_draw_the_first_and_trace_the_others(method: Any) -> N
 @pytest.mark.parametrize(
     ("depth", "forks", "told"),
     [
-        (3, 1, "3 interfaces, or that follow the weaker of the reflected and the refracted ray more often than once: "),
+        (3, 1, "3 interfaces, or follow the weaker of the reflected and the refracted ray more often than once, "),
         (
             12,
             3,
-            "12 interfaces, or that follow the weaker of the reflected and the refracted ray more often than 3 times: ",
+            "12 interfaces, or follow the weaker of the reflected and the refracted ray more often than 3 times, ",
         ),
-        (1, 0, "1 interface, or that follow the weaker of the reflected and the refracted ray: "),
+        (1, 0, "1 interface, or follow the weaker of the reflected and the refracted ray, "),
     ],
 )
 def test_traced_interfaces_tell_what_they_cut_off_and_no_more(depth: int, forks: int, told: str) -> None:
@@ -271,8 +271,8 @@ INSIDE = tl.Scene([body(DIAMOND)], tl.Camera.look_at((0, 0, 0.2), (0, 0, -1)))
 CUT = tl.Scene([body(DIAMOND)], tl.Camera.orthographic((0, 0, 0.2), (0, 0, -1), height=1))
 DENSITY = scene(body(DIAMOND, density=tl.LinearDensity(1, 0.1, 2.0)))
 UNTRACED = {
-    "cut": (CUT, "the orthographic picture's plane, where rays start, cuts 'box'"),
-    "density": (DENSITY, "'box': the density varies, and rays cross media in one step"),
+    "cut": (CUT, "the image plane of the orthographic camera, where rays start, cuts 'box'"),
+    "density": (DENSITY, "'box': the density varies, but traced rays cross each medium in one step"),
 }
 
 
@@ -289,7 +289,7 @@ def test_what_rays_cannot_be_traced_through_is_refused_or_drawn(asked: tl.Scene,
     assert found.interfaces == SCREEN
     assert [step.name for step in found.passes] == [step.name for step in drawn.passes]
     (shading,) = (step for step in found.passes if step.name is PassName.SURFACES)
-    assert shading.reason.endswith(f"; in screen space, since {why}")
+    assert shading.reason.endswith(f"; in screen space, because {why}")
 
 
 def test_bodies_that_a_picture_cuts_do_not_matter_as_sheets_or_without_interfaces() -> None:
@@ -299,7 +299,7 @@ def test_bodies_that_a_picture_cuts_do_not_matter_as_sheets_or_without_interface
 
 def test_nothing_is_traced_before_a_backdrop() -> None:
     asked = scene(body(DIAMOND))
-    with pytest.raises(tl.InputError, match=r"have no mesh that a ray could meet; use ScreenInterfaces\(\) instead$"):
+    with pytest.raises(tl.InputError, match=r"have no mesh that a ray could hit; use ScreenInterfaces\(\) instead$"):
         plan_over_backdrop(asked, interfaces=TRACED)
     assert plan_over_backdrop(asked).interfaces == SCREEN
     assert plan_over_backdrop(asked, interfaces=FRONT).interfaces == FRONT

@@ -26,21 +26,24 @@ BENT = "refracted and reflected light"
     ("objects", "effects"),
     [
         ([body()], []),
-        ([body(MILK)], ["in-scattered light: scattering only removes light"]),
+        ([body(MILK)], ["scattering only removes light from rays"]),
         ([body(DIAMOND)], [BENT]),
         (
             [body(), body(None)],
-            ["shadows of the environment: its light reaches opaque objects as if nothing was in the way"],
+            ["the environment casts no shadows on opaque objects"],
         ),
-        ([body(MILK), body(DIAMOND, x=9), body(None)], ["in-scattered light", BENT, "shadows"]),
+        (
+            [body(MILK), body(DIAMOND, x=9), body(None)],
+            ["scattering only removes", BENT, "the environment casts no shadows"],
+        ),
     ],
 )
 @pytest.mark.parametrize("method", [None, tl.SignedDepth(), tl.ThinLayer(), *ORDERED])
 def test_an_effect_that_no_pass_renders_is_told(objects: list[tl.Object], effects: list[str], method: Any) -> None:
     cut_off = (
-        "rays that cross more than 24 interfaces, or that follow the weaker of the reflected and the refracted ray more"
+        "rays that cross more than 24 interfaces, or follow the weaker of the reflected and the refracted ray more"
     )
-    first_interval = "refraction and reflection after the first body"
+    first_interval = "after the first body on a ray, the ray goes straight"
     traced = first_interval if method == tl.ThinLayer() else cut_off  # sheets bend no ray
     for interfaces, bent in ((None, traced), (tl.ScreenInterfaces(), first_interval)):
         found = plan(scene(*objects), method, interfaces=interfaces, scattering=tl.SingleScattering())
@@ -81,8 +84,8 @@ def test_an_open_body_is_marked_and_falls_back_to_a_sheet(method: Any, passes: l
         assert step.target == ("fallback" if name.endswith("fallback") else "accumulated")
         assert step.objects == (0, 1) or step.target == "fallback" or name == "transmittance"
     assert steps["thin_layer_fallback"].reason == (
-        "'open box' not closed: pixels that enter and leave unequally often get sheets of 1% of the diagonal, and are "
-        "marked invalid"
+        "'open box': not closed; pixels with unequal entries and exits show sheets of 1% of the diagonal, and are "
+        "marked as invalid"
     )
     assert found.limits[0] == (
         "'open box': 3 open edges (first: vertices (0, 1), (0, 3), (1, 3)): close the mesh, or declare it "
@@ -113,17 +116,33 @@ def test_an_open_mesh_drawn_as_a_sheet_needs_no_fallback() -> None:
 @pytest.mark.parametrize(
     ("objects", "method", "limits"),
     [
-        ([body()], tl.SignedDepth(anchored=False), ["distances count from the camera: float32 loses digits"]),
-        ([body(mesh=TORUS)], tl.BackFaceDepth(), ["'torus' not convex: pixels with more than one entry are marked in"]),
-        ([body(), body(x=3)], tl.BackFaceDepth(), ["several bodies: pixels that cross more than one are marked inval"]),
-        ([body(mesh=OPEN)], tl.BackFaceDepth(), ["'open box': 3 open edges", "'open box' not convex: pixels with"]),
-        ([body()], tl.ThinLayer(), ["'box' closed, but drawn as sheets: the inside is left out"]),
-        ([sheet(), body(), body(mesh=TORUS), body(mesh=OPEN)], tl.ThinLayer(), ["'box', 'torus' closed, but drawn as"]),
-        ([body(mesh=DOUBLED)], None, ["'walls': 12 duplicated faces, whose distances count twice or cancel"]),
-        ([sheet(mesh=DOUBLED)], None, ["'walls': 12 duplicated faces, whose distances count twice or cancel"]),
-        ([body(mesh=INSIDE_OUT)], None, ["'half flipped': 1 closed parts inside out: their pixels are marked invalid"]),
-        ([body(mesh=INSIDE_OUT)], tl.FragmentLists(), ["'half flipped': 1 closed parts inside out: their pixels are"]),
-        ([body(mesh=INSIDE_OUT)], tl.ThinLayer(), ["'half flipped' closed, but drawn as sheets"]),
+        ([body()], tl.SignedDepth(anchored=False), ["distances are measured from the camera, so float32 loses digits"]),
+        (
+            [body(mesh=TORUS)],
+            tl.BackFaceDepth(),
+            ["'torus': not convex, so pixels with more than one entry are marked as in"],
+        ),
+        ([body(), body(x=3)], tl.BackFaceDepth(), ["pixels whose rays cross more than one body are marked as inval"]),
+        ([body(mesh=OPEN)], tl.BackFaceDepth(), ["'open box': 3 open edges", "'open box': not convex, so pixels with"]),
+        ([body()], tl.ThinLayer(), ["'box': closed, but drawn as sheets, without the inside"]),
+        (
+            [sheet(), body(), body(mesh=TORUS), body(mesh=OPEN)],
+            tl.ThinLayer(),
+            ["'box', 'torus': closed, but drawn as"],
+        ),
+        ([body(mesh=DOUBLED)], None, ["'walls': 12 faces are duplicated, so their distances count twice or cancel"]),
+        ([sheet(mesh=DOUBLED)], None, ["'walls': 12 faces are duplicated, so their distances count twice or cancel"]),
+        (
+            [body(mesh=INSIDE_OUT)],
+            None,
+            ["'half flipped': 1 closed parts are inside out: these pixels are marked as invalid"],
+        ),
+        (
+            [body(mesh=INSIDE_OUT)],
+            tl.FragmentLists(),
+            ["'half flipped': 1 closed parts are inside out: these pixels are"],
+        ),
+        ([body(mesh=INSIDE_OUT)], tl.ThinLayer(), ["'half flipped': closed, but drawn as sheets"]),
         ([sheet(mesh=INSIDE_OUT), body()], None, []),
     ],
 )

@@ -28,8 +28,8 @@ def test_marching_goes_through_the_lists() -> None:
 def test_marching_is_not_exact_and_says_so() -> None:
     found = plan(scene(body(FIRE)), tl.RayMarched(steps=32, quadrature="left"))
     assert found.limits == (
-        "what is emitted and scattered is a sum over 32 steps in each interval (left); what lies behind a "
-        "transmittance of 1e-05 is left out of it",
+        "emission and scattered light are summed over 32 steps in each interval (left), down to a "
+        "transmittance of 1e-05",
     )
 
 
@@ -50,10 +50,10 @@ def test_where_the_density_varies_rays_march(density: Any, steps: int) -> None:
     assert found.method == tl.RayMarched(steps=steps)
     assert names(found) == ["fragment_lists", "transmittance"]
     assert "the density varies from place to place; one draw" in found.passes[0].reason
-    assert found.limits[0].startswith(f"optical depth, and what is emitted and scattered, are a sum over {steps} steps")
+    assert found.limits[0].startswith(f"optical depth, emission and scattered light are summed over {steps} steps")
     lit = plan(scene(body(CLOUD, density=density), body(x=3), lights=SUN))
     assert names(lit) == ["light_views", "fragment_lists", "transmittance"]
-    assert "depths from the lights are exact" in lit.limits[0]
+    assert "optical depths towards lights are exact" in lit.limits[0]
 
 
 @pytest.mark.parametrize(

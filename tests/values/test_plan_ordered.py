@@ -34,7 +34,11 @@ FACES = len(TORUS.faces)
 #: Passes before the last; * is the ordered pass, ! a refusal with these words. A column for each of `COLUMNS`, and one
 #: for the methods that find ordered intervals.
 FALLBACKS = "thin_layer_fallback signed_depth_fallback"
-DIFFER, ORDER, SHEET = "! different media", "! leave the choice to the planner", "! declared as a thin-walled sheet"
+DIFFER, ORDER, SHEET = (
+    "! different media",
+    "! leave the choice to the planner",
+    "! this method cannot render thin-walled sheets",
+)
 PASSES = {
     "convex": ("signed_depth", "signed_depth", "back_face_depth", "thin_layer", "*"),
     "concave": ("signed_depth", "signed_depth", "back_face_depth", "thin_layer", "*"),
@@ -122,8 +126,8 @@ def test_what_an_ordered_method_makes_of_a_scene(kind: str, method: Any, name: s
 def test_sheets_among_intervals_that_emit_are_a_limit(medium: tl.Medium, other: tl.Medium) -> None:
     found = plan(scene(body(medium), sheet(other)), tl.FragmentLists())
     assert found.limits == (
-        "declared sheets among media that emit: sheets dim all light on a ray, even light in front of them, and the "
-        "emission of sheets is left out",
+        "sheets among media that emit light: a sheet dims all light on its ray, even light in front of it, and "
+        "emits none",
     )
     # Without emission the order of sheets matters to nothing, and without sheets there is none.
     assert plan(scene(body(GLASS), sheet(WINE)), tl.FragmentLists()).exact
@@ -225,7 +229,7 @@ def test_without_opengl_rays_find_all_intervals_whatever_the_method(method: Any)
         (
             tl.KBuffer(k=2),
             "all surfaces on each ray, in float64",
-            "in place of KBuffer(k=2, light_points=8), ",
+            "in place of the requested KBuffer(k=2, light_points=8)",
         ),
         (tl.ThinLayer(0.01), "all surfaces on each ray, in float64, as sheets of 0.01 m", "no OpenGL"),
     ],
@@ -247,7 +251,8 @@ def test_without_opengl_slots_and_emitting_sheets_are_no_limit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("scattering", "told"), [(True, "light that is scattered more than once"), (False, "in-scattered light")]
+    ("scattering", "told"),
+    [(True, "light that is scattered more than once"), (False, "this method leaves out the light")],
 )
 def test_without_opengl_light_may_be_followed_or_not(scattering: bool, told: str) -> None:
     lit = scene(body(tl.Medium(scattering=1.0)), lights=[tl.DirectionalLight((0, -1, 0), (1, 1, 1))])

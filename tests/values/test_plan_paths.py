@@ -56,10 +56,14 @@ def test_nobody_gets_paths_unasked() -> None:
 @pytest.mark.parametrize(
     ("objects", "kind", "words"),
     [
-        ([body()], NoteKind.LIGHTS_LEFT_OUT, "polished interfaces refract"),
-        ([body(surface=Surface(dispersion=1.0))], NoteKind.REFRACTION, "refract all colors alike"),
-        ([body(surface=Surface(clearcoat=0.5, clearcoat_roughness=0.2))], NoteKind.COATS, "roughness of clear coats"),
-        ([body(surface=Surface(emissive=(1, 1, 1)))], NoteKind.GLOW, "light that surfaces emit: missing"),
+        ([body()], NoteKind.LIGHTS_LEFT_OUT, "caustics and refracted light of point, spot"),
+        ([body(surface=Surface(dispersion=1.0))], NoteKind.REFRACTION, "no dispersion; all colors are refracted alike"),
+        (
+            [body(surface=Surface(clearcoat=0.5, clearcoat_roughness=0.2))],
+            NoteKind.COATS,
+            "rough clear coats are rendered as polished",
+        ),
+        ([body(surface=Surface(emissive=(1, 1, 1)))], NoteKind.GLOW, "light that these surfaces emit is missing"),
     ],
 )
 def test_what_no_path_shows_is_told(objects: list[tl.Object], kind: NoteKind, words: str) -> None:
@@ -111,11 +115,11 @@ def test_frosted_and_matched_bodies_leave_no_light_out() -> None:
     [
         ([tl.Object(tl.Mesh(body().mesh.vertices, body().mesh.faces[1:]), MILK)], {}, "not closed, .* close it, or"),
         ([body(density=tl.LinearDensity(2, 0.5, 1.0))], {}, r"density varies, .* tl\.reference\.path_trace"),
-        ([body(sheet_thickness=0.1)], {}, "a sheet that scatters; give it an inside"),
+        ([body(sheet_thickness=0.1)], {}, "path tracing does not support sheets that scatter; use a closed body"),
         (
             [body(tl.Medium(1.0, ior=1.5), sheet_thickness=0.1, surface=Surface(roughness=0.5))],
             {},
-            "a sheet that is rough",
+            "path tracing does not support rough sheets",
         ),
         ([body(tl.Medium(), sheet_thickness=0.1, surface=Surface(opacity=0.5))], {}, "partly transparent layers"),
         ([body()], {"ambient": (1, 1, 1)}, "PathTraced with ambient radiance; .* omit the ambient radiance"),
@@ -131,7 +135,7 @@ def test_what_paths_take_the_place_of_cannot_be_asked_for() -> None:
         plan(scene(), METHOD, interfaces=tl.TracedInterfaces())
     with pytest.raises(tl.InputError, match=r"scattering=Diffusion\(.*; path tracing replaces scattering"):
         plan(scene(), METHOD, scattering=tl.Diffusion())
-    with pytest.raises(tl.InputError, match=r"in front of a backdrop; .* no mesh that a path could meet"):
+    with pytest.raises(tl.InputError, match=r"in front of a backdrop; .* no mesh that a path could hit"):
         plan_over_backdrop(scene(), METHOD)
     with pytest.raises(tl.InputError, match=r"works on the CPU; use tl\.reference\.path_trace\(scene, size, paths\)"):
         plan(scene(), METHOD, tl.Capabilities(opengl=False))

@@ -14,7 +14,9 @@ from translucent.planning.plan import plan
 
 @pytest.mark.parametrize("method", ["RayMarched", "signed-depth", tl.ThinLayer, 3])
 def test_what_is_no_method_is_refused(method: Any) -> None:
-    with pytest.raises(tl.InputError, match=r"^method .*; not a thickness method; give for example tl.SignedDepth\(\)"):
+    with pytest.raises(
+        tl.InputError, match=r"^method .*; this is not a thickness method; give for example tl.SignedDepth\(\)"
+    ):
         plan(scene(body()), method)
 
 
@@ -70,7 +72,7 @@ def test_sheets_of_several_media_that_emit_are_refused(method: Any) -> None:
             [body(), sheet(mesh=TORUS)],
             {},
             tl.BackFaceDepth(),
-            "BackFaceDepth; 'torus' declared as a thin-walled sheet; use SignedDepth or ThinLayer",
+            "BackFaceDepth; 'torus': this method cannot render thin-walled sheets; use SignedDepth or ThinLayer",
         ),
         *(
             (
@@ -94,5 +96,5 @@ def test_a_method_that_cannot_render_the_scene_is_refused(
 def test_methods_that_count_no_place_twice_know_no_overlap_policy(overlap: Any) -> None:
     # Sheets have no inside; and back-face depth marks pixels that enter twice.
     found = plan(scene(body(), body(mesh=TORUS, x=0.5), overlap=overlap), tl.BackFaceDepth())
-    assert any("cross more than one are marked invalid" in limit for limit in found.limits)
+    assert any("cross more than one body are marked as invalid" in limit for limit in found.limits)
     assert names(plan(scene(body(), body(x=0.5), overlap=overlap), tl.ThinLayer())) == ["thin_layer", "transmittance"]

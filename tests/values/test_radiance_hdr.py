@@ -124,22 +124,25 @@ def test_other_orientations(tmp_path: Path, text: bytes, turn: object) -> None:
 
 
 BROKEN = {
-    "no Radiance": (b"P6\n2 2\n255\n", "not a Radiance picture"),
-    "no size": (HEAD + b"2 by 2\n", "its header has no size"),
-    "no end of the header": (b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n", "its header has no size"),
-    "both the same axis": (HEAD + b"-Y 2 +Y 2\n" + bytes(16), "its header has no size"),
-    "another format": (b"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n" + size(1, 1) + bytes(4), "format 32-bit_rle_xyze"),
-    "no exposure": (b"#?RADIANCE\nEXPOSURE=0\n\n" + size(1, 1) + bytes(4), "exposure 0; save it again"),
+    "no Radiance": (b"P6\n2 2\n255\n", "the file does not begin with #"),
+    "no size": (HEAD + b"2 by 2\n", "the header has no picture size"),
+    "no end of the header": (b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n", "the header has no picture size"),
+    "both the same axis": (HEAD + b"-Y 2 +Y 2\n" + bytes(16), "the header has no picture size"),
+    "another format": (
+        b"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n" + size(1, 1) + bytes(4),
+        "the format is 32-bit_rle_xyze",
+    ),
+    "no exposure": (b"#?RADIANCE\nEXPOSURE=0\n\n" + size(1, 1) + bytes(4), "the exposure is 0; save it again"),
     "nothing in it": (HEAD + size(0, 4), "4x0 pixels"),
     "far too much": (HEAD + size(10**9, 10**9), "1000000000x1000000000 pixels"),
-    "no pixels": (HEAD + size(2, 4), "it ends after 0 of 8 pixels"),
-    "few pixels": (HEAD + size(2, 4) + stored(1, 4).tobytes(), "it ends after 4 of 8 pixels"),
-    "a repetition first": (HEAD + size(1, 4) + bytes((1, 1, 1, 4)), "it repeats a pixel that it does not have"),
+    "no pixels": (HEAD + size(2, 4), "the file ends after 0 of 8 pixels"),
+    "few pixels": (HEAD + size(2, 4) + stored(1, 4).tobytes(), "the file ends after 4 of 8 pixels"),
+    "a repetition first": (HEAD + size(1, 4) + bytes((1, 1, 1, 4)), "the file repeats a pixel before the first pixel"),
     "a missing row": (HEAD + size(4, 9) + by_channel(stored(3, 9)), "row 3 of 4 is missing"),
-    "half a row": (HEAD + size(3, 9) + by_channel(stored(3, 9))[:-3], "it ends in row 2 of 3"),
-    "half a run": (HEAD + size(1, 9) + bytes((2, 2, 0, 9, 137)), "it ends in row 0 of 1"),
+    "half a row": (HEAD + size(3, 9) + by_channel(stored(3, 9))[:-3], "the file ends in row 2 of 3"),
+    "half a run": (HEAD + size(1, 9) + bytes((2, 2, 0, 9, 137)), "the file ends in row 0 of 1"),
     "too long a run": (HEAD + size(1, 9) + bytes((2, 2, 0, 9)) + bytes((200, 7)) * 9, "row 0 of 1 is too long"),
-    "an empty literal": (HEAD + size(1, 9) + bytes((2, 2, 0, 9, 0, 0, 0)), "it ends or is broken in row 0"),
+    "an empty literal": (HEAD + size(1, 9) + bytes((2, 2, 0, 9, 0, 0, 0)), "the file ends, or is broken, in row 0"),
 }
 
 

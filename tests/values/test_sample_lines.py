@@ -71,9 +71,8 @@ def test_a_body_that_is_inverted_as_a_whole_is_judged_as_it_is_drawn() -> None:
 
 
 def test_the_diagnosis_names_a_lobe() -> None:
-    assert str(bow_tie().diagnosis) == (
-        "closed, 1 component; inside out in places: the surface crosses itself, and a lobe of it looks inwards"
-    )
+    words = "inside out in places: the surface intersects itself, and the faces of one lobe point inwards"
+    assert str(bow_tie().diagnosis) == f"closed, 1 component; {words}"
 
 
 def test_where_a_lobe_is_inside_out_the_order_of_surfaces_has_to_be_found() -> None:
@@ -81,8 +80,8 @@ def test_where_a_lobe_is_inside_out_the_order_of_surfaces_has_to_be_found() -> N
     assert plan(scene).ordered
     assert "'bow tie' is inside out in places" in plan(scene).passes[0].reason
     assert plan(scene, tl.SignedDepth()).limits == (
-        "'bow tie': inside out in places: SignedDepth cannot say which pixels show one, so all that it covers are "
-        "marked invalid; FragmentLists can",
+        "'bow tie': the mesh is inside out in places: SignedDepth cannot tell which pixels are wrong, and marks all as "
+        "invalid; FragmentLists can",
     )
 
 

@@ -51,11 +51,11 @@ def test_light_diffuses_in_closed_bodies_with_an_interface(lights: list[tl.Point
 @pytest.mark.parametrize(
     ("what", "why"),
     [
-        (body(WAX, OPEN), "its mesh is not closed"),
-        (body(WAX, INSIDE_OUT), "its mesh is inside out"),
+        (body(WAX, OPEN), "the mesh is not closed"),
+        (body(WAX, INSIDE_OUT), "the mesh is inside out"),
         (
             body(tl.Medium(scattering=5e3, ior=1.4), THIN),
-            "it is thinner than 0.25 cells everywhere; a cell is 0.005 m at this",
+            "the body is everywhere thinner than 0.25 cells of 0.005 m",
         ),
     ],
     ids=["open", "inside out", "thin"],
@@ -66,8 +66,7 @@ def test_bodies_in_which_light_cannot_diffuse_are_layers(what: tl.Object, why: s
         found = plan(scene(what), scattering=asked)
         assert (found.treated(Treatment.DIFFUSION), found.treated(Treatment.LAYER)) == ((), (0,))
         (note,) = (note for note in found.unmodelled if note.kind is NoteKind.LAYER_INSTEAD)
-        assert str(note).startswith(f"diffusion in {what.mesh.name!r}: {why}")
-        assert str(note).endswith("; these bodies are rendered as flat layers")
+        assert str(note).startswith(f"{what.mesh.name!r}: flat layers replace diffusion, because {why}")
         assert found.says(NoteKind.SPREAD_INSIDE)
         assert not found.says(NoteKind.DIFFUSED_LIGHT)
 
@@ -127,7 +126,7 @@ def test_what_is_asked_for_is_done_where_it_can_be(medium: tl.Medium) -> None:
 def test_sheets_are_layers_if_asked_for_and_partly_transparent_layers_nothing(asked: Any) -> None:
     found = choose_treatments(scene(sheet(WAX)), asked)
     assert found.of == {0: Treatment.LAYER}
-    assert found.refusals == (((0, "it is a sheet"),) if asked == tl.Diffusion() else ())
+    assert found.refusals == (((0, "the body is a sheet"),) if asked == tl.Diffusion() else ())
     lacquer = body(WAX, surface=tl.Surface(opacity=0.5), sheet_thickness=1e-3)
     assert lacquer.covers
     assert not many_times(plan(scene(lacquer), scattering=asked))
@@ -139,7 +138,7 @@ def test_each_body_has_its_own_way() -> None:
     found = plan(asked)
     treatments = Treatment.DIFFUSION, Treatment.LAYER, Treatment.VOLUME
     assert [found.treated(one) for one in treatments] == [(0,), (1,), (2,)]
-    assert choose_treatments(asked, None).refusals == ((1, "its mesh is not closed"),)
+    assert choose_treatments(asked, None).refusals == ((1, "the mesh is not closed"),)
     kinds = NoteKind.DIFFUSED_LIGHT, NoteKind.SPREAD_INSIDE, NoteKind.LAYER_INSTEAD
     for kind in kinds:
         assert found.says(kind)
@@ -185,8 +184,8 @@ def test_single_scattering_reaches_the_method(points: int) -> None:
 @pytest.mark.parametrize("asked", ["diffusion", tl.Diffusion, 3, False])
 def test_what_is_no_choice_of_scattering_is_refused(asked: Any) -> None:
     message = (
-        f"scattering {asked!r}; not a choice of scattering; give tl.Diffusion(resolution=32), tl.ScatteringLayer() or "
-        "tl.SingleScattering(points=8)"
+        f"scattering {asked!r}; this is not a choice of scattering; give tl.Diffusion(resolution=32), "
+        "tl.ScatteringLayer() or tl.SingleScattering(points=8)"
     )
     with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
         plan(scene(body(WAX)), scattering=asked)
@@ -212,7 +211,7 @@ def test_resolutions_out_of_reach_are_refused(resolution: Any, message: str) -> 
 
 def test_layers_of_varying_density_are_refused() -> None:
     cloud = body(tl.Medium(scattering=5.0, ior=1.4), density=VARYING)
-    message = "ScatteringLayer(); 'box': its density varies; use SingleScattering() instead"
+    message = "ScatteringLayer(); 'box': the density varies; use SingleScattering() instead"
     with pytest.raises(tl.InputError, match=f"^{re.escape(message)}$"):
         plan(scene(cloud), scattering=tl.ScatteringLayer())
     # Beside another body, which can be a layer, it is what it is.
@@ -243,7 +242,7 @@ def test_a_body_whose_bounds_are_nearly_empty_is_a_layer() -> None:
     pair = joined([(ball.vertices, ball.faces), (ball.vertices + [2000, 2000, 2000], ball.faces)], "pair")
     found = plan(scene(body(WAX, pair)))
     assert found.treated(Treatment.LAYER) == (0,)
-    assert any("nearly empty" in note for note in found.unmodelled if note.kind is NoteKind.LAYER_INSTEAD)
+    assert any("mostly empty" in note for note in found.unmodelled if note.kind is NoteKind.LAYER_INSTEAD)
 
 
 CLOUD = body(MILK, density=VARYING)
@@ -255,7 +254,7 @@ def test_light_is_scattered_on_where_density_varies(lights: list[tl.PointLight])
     assert treatment_of(found.scene.objects[0]) is Treatment.VOLUME
     assert found.diffuses
     assert isinstance(found.method, tl.RayMarched)
-    assert "is scattered on (Diffusion(resolution=32)) in 1 body" in str(found)
+    assert "is added along view rays (Diffusion(resolution=32)) in 1 body" in str(found)
     assert found.says(NoteKind.DIFFUSED_LIGHT)
     assert not found.says(NoteKind.SCATTERED_AGAIN)
     assert not found.says(NoteKind.ONLY_REMOVES)
@@ -297,7 +296,7 @@ def test_bodies_that_a_ground_lights_show_it_through_their_surface() -> None:
         replace(scene(fog, ground), camera=tl.Camera.look_at(place, (0.0, 0.0, -9.0))),
     ):
         assert plan(kept).treated(Treatment.VOLUME) == (0,)
-        assert "light that grounds reflect into the medium" in str(plan(kept))
+        assert "light that the ground reflects into the fog" in str(plan(kept))
 
 
 def test_a_march_that_is_asked_for_has_light_scattered_once() -> None:
@@ -328,8 +327,8 @@ def test_more_fogs_than_winding_numbers_give_back_light_through_their_surfaces()
 @pytest.mark.parametrize(
     ("asked", "bodies", "capabilities", "message"),
     [
-        (tl.Diffusion(), body(MILK, density=VARYING), Capabilities(opengl=False), "its light needs ray marching"),
-        (tl.ScatteringLayer(), body(WAX), Capabilities(opengl=False), "'box': this renderer draws no layers"),
+        (tl.Diffusion(), body(MILK, density=VARYING), Capabilities(opengl=False), "so light needs ray marching"),
+        (tl.ScatteringLayer(), body(WAX), Capabilities(opengl=False), "'box': this renderer has no flat layers"),
     ],
 )
 def test_what_can_be_done_for_no_body_is_refused(

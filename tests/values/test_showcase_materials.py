@@ -38,7 +38,7 @@ def test_a_color_at_a_distance_is_that_of_a_solid() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: tl.showcase(BOX, "#ace5c9"), "a color needs a distance; give the metres after which"),
+        (lambda: tl.showcase(BOX, "#ace5c9"), "a color needs a distance; give the distance in metres after which"),
         (lambda: tl.showcase(BOX, "waxx"), "did you mean wax"),
         (lambda: tl.showcase(BOX, tl.preset("wax"), distance=0.25), "a Preset, and no color"),
         (lambda: tl.Object(BOX, tl.Medium(), material="wax"), "a medium is given, too"),

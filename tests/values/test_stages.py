@@ -226,7 +226,9 @@ def test_several_bodies_are_framed_for_a_stage():
 
 
 def test_a_scene_on_a_stage_gets_no_second_one() -> None:
-    with pytest.raises(tl.InputError, match="the scene already has a ground that catches shadows; make it without one"):
+    with pytest.raises(
+        tl.InputError, match="the scene already has a ground that catches shadows; use a scene without a stage"
+    ):
         tl.staged(showcase(BOX, GLASS, SIZE), "night")
 
 

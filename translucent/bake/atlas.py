@@ -19,7 +19,7 @@ CHART_GAP, GAP_SHARE = 4, 1 / 128
 WHOLE = 1e-7
 
 #: Advice about texture coordinates that no map can have.
-ANEW = "make new ones with --unwrap (in Python, leave out the uv), or unwrap it in a modelling tool"
+ANEW = "make new UVs with --unwrap (in Python: omit uv), or unwrap the mesh in a modelling tool"
 
 #: Largest number of tiles that one triangle may cover; more repeat a texture, which no thickness does.
 MOST_TILES = 4.0
@@ -154,8 +154,8 @@ def _doubts(
             )
         return ()
     if len(tiles) > 1 and 0 not in tiles and not crossing.any():
-        text = f"the texture coordinates use the UDIM tiles {listed}, which one map lays over one another"
-        return (f"{text}: bake each, as by -o 'name.<UDIM>.png'",)
+        text = f"the texture coordinates use the UDIM tiles {listed}, which overlap in a single map"
+        return (f"{text}: to bake each tile, use -o 'name.<UDIM>.png'",)
     if outside := int(((uv < 0) | (uv > 1)).any(axis=(1, 2)).sum()):
         return (f"{outside} of {len(uv)} faces have texture coordinates outside 0..1, where the map repeats",)
     return ()
@@ -279,7 +279,7 @@ class Atlas:
         return Texels(rows + begin, columns, face[best], barycentric, within, overlapping)
 
     def _overlapping(self, texel: Integers, face: Integers, center: Array, pairs: Integers, count: int) -> Mask:
-        """(count,): whether several faces have the center of a texel, of the `pairs` in which the face has it."""
+        """(count,): whether the center of each texel lies in several faces; `pairs` list the faces at each center."""
         several = np.bincount(texel[pairs], minlength=count) > 1
         # Most of these are on an edge of two faces.
         pairs = pairs[several[texel[pairs]]]
@@ -345,7 +345,7 @@ def _closest_on_edges(corners: Array, point: Array) -> tuple[Array, Array]:
 
 
 def pad(values: npt.NDArray[np.float32], valued: npt.NDArray[np.bool_], padding: int) -> None:
-    """Give texels up to `padding` texels from a texel with a value that of the nearest, in place.
+    """Fill empty texels within `padding` texels of a filled texel with the nearest value, in place.
 
     Between two charts each thus keeps the half of the gap that is next to it, and covers nothing of the other.
 

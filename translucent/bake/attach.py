@@ -32,7 +32,7 @@ OF_BAKES = {"thickness": "values", "standard_error": "standard_error"}
 def attach(
     mesh: Any, result: VertexThickness | ThicknessMap | Frame, quantity: str = "thickness", unit: str | None = None
 ) -> Array:
-    """Put what was baked or rendered on a mesh of trimesh or PyVista, as an array with a value for each vertex.
+    """Store baked or rendered values in a mesh of trimesh or PyVista, as an array with a value for each vertex.
 
     It is ``mesh.vertex_attributes[quantity]`` of a `trimesh.Trimesh`, and ``mesh[quantity]`` of a `pyvista.PolyData`.
     Vertices are found by their positions, so that welded ones get the value of the one that is left.
@@ -62,13 +62,17 @@ def attach(
     """
     known = OF_FRAMES if isinstance(result, Frame) else tuple(OF_BAKES)
     if quantity not in known:
-        raise InputError(f"quantity {quantity!r} of {type(result).__name__}", "not known", f"use {', '.join(known)}")
+        raise InputError(
+            f"quantity {quantity!r} of {type(result).__name__}",
+            "no quantity has this name",
+            f"use {', '.join(known)}",
+        )
     held = getattr(mesh, "vertex_attributes", None)
     held = getattr(mesh, "point_data", None) if held is None else held
     parts = None if is_scene(mesh) else foreign_parts(mesh)
     if parts is None or held is None:
         do = "give a trimesh.Trimesh or a pyvista.PolyData, for example scene.geometry['name']"
-        raise InputError(f"attach to {brief(mesh)}", "the result holds no values for the vertices of a single mesh", do)
+        raise InputError(f"attach to {brief(mesh)}", "this is not a single mesh with values at its vertices", do)
     points, used = parts[0][0] * unit_of(mesh, unit)[0], np.unique(parts[0][1]).astype(np.int64)
     if isinstance(result, Frame):
         values = _of_frame(points, used, result, quantity, foreign_name(mesh))
@@ -86,7 +90,7 @@ def attach(
 
 
 def _places(points: Array, used: Integers, mesh: Mesh) -> tuple[Integers, int]:
-    """(n,): vertices of a mesh where the points are, -1 for none; and how many of the used ones have none."""
+    """(n,): the mesh vertex at each point, -1 if there is none; and how many of the `used` points have none."""
     from scipy.spatial import KDTree
 
     found = KDTree(mesh.vertices).query(points, distance_upper_bound=SAME_PLACE * mesh.diagonal)[1]
@@ -95,11 +99,11 @@ def _places(points: Array, used: Integers, mesh: Mesh) -> tuple[Integers, int]:
 
 
 def _strange(name: str, missing: int, count: int, what: str) -> InputError:
-    found = f"{missing} of its {count} vertices are not those of {what}"
+    found = f"{missing} of its {count} vertices are not vertices of {what}"
     return InputError(
         f"attach to {name!r}",
         found,
-        "attach to the same mesh that was baked or rendered, and state its unit with unit=",
+        "attach to the mesh that was baked or rendered, and state its unit=",
     )
 
 

@@ -265,16 +265,16 @@ def check_threads(threads: Any) -> int:
 def _map_report(unwrapped: Unwrapped, strips: Strips, canvas: Canvas, traced: int, seconds: float) -> BakeReport:
     doubts = []
     if overlapping := canvas.count("overlapping"):
-        doubts.append(f"{overlapping} texels lie in several triangles in UV; the first triangle has them")
+        doubts.append(f"{overlapping} texels lie in several triangles in UV space, and use the first triangle")
     hidden = ~canvas.owners[strips.shown]
     a, b, c = strips.low.corners[strips.shown].transpose(1, 0, 2)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     fraction = float(area[hidden].sum() / area.sum())
     if fraction > MOST_HIDDEN and canvas.size**2 > ENOUGH_TEXELS * len(hidden):
         count = f"{hidden.sum()} of {len(hidden)} faces, {fraction:.0%} of the surface,"
-        doubts.append(f"{count} have no texel: they are too small in UV, or lie below others there")
+        doubts.append(f"{count} have no texel: they are too small in UV space, or overlap other faces there")
     if missed := canvas.count("missed") / max(canvas.count("samples"), 1):
-        doubts.append(f"{missed:.2%} of the samples found no surface of the high mesh; they get the value beside them")
+        doubts.append(f"{missed:.2%} of the samples missed the detailed mesh, and use values of neighbors")
     report = _report(
         unwrapped.mesh if strips.projection is None else None,
         canvas.errors[canvas.valued],
@@ -298,19 +298,17 @@ def _map_report(unwrapped: Unwrapped, strips: Strips, canvas: Canvas, traced: in
 def _report(
     mesh: Mesh | None, errors: Floats, counts: dict[str, int], degenerate: int, seconds: float, doubts: list[str]
 ) -> BakeReport:
-    """Report on rays from points of a mesh; None is one whose holes are not looked for."""
+    """Report on rays from points of a mesh; with None, holes are not searched for."""
     said, escaped = [], counts["escaped"] / max(counts["cast"], 1)
     if escaped:
         holes = mesh is not None and not mesh.diagnosis.closed
-        reason = "the mesh has holes" if holes else "faces are missing or look the wrong way"
-        said = [
-            f"{escaped:.2%} of the rays left the mesh without an exit ({reason}); they count as max_distance, or not"
-        ]
+        reason = "the mesh has holes" if holes else "faces are missing or point inwards"
+        said = [f"{escaped:.2%} of the rays found no exit ({reason}): they count as max_distance, or not at all"]
     said += doubts
     if degenerate:
-        said.append(f"{degenerate} faces without area are left out")
+        said.append(f"{degenerate} faces without an area were left out")
     if counts["above"]:
-        said.append(f"{counts['above']} samples stay above the tolerance with the most rays that they may have")
+        said.append(f"{counts['above']} samples have an error above the tolerance even with the largest number of rays")
     return BakeReport(
         rays=counts["traced"],
         seconds=seconds,

@@ -189,7 +189,7 @@ def bake_many(
 def _here(jobs: list[Job], workers: int) -> Iterator[Record]:
     workers = min(workers, max(len(jobs), 1))
     per_worker = max(processors() // workers, 1)
-    died = "its process died; out of memory, or a crash; try a smaller --size"
+    died = "the worker process ended (out of memory, or a crash); try a smaller --size"
     tasks = [{"threads": per_worker, **job} for job in jobs]
     return in_processes(run_job, tasks, workers, lambda job: failed_entry(job, died))
 
@@ -203,7 +203,7 @@ def _in_executor(executor: Executor, jobs: list[Job]) -> Iterator[Record]:
             try:
                 yield future.result()
             except Exception as error:  # noqa: BLE001 - lost workers, other versions: each executor raises its own kinds
-                yield failed_entry(job, f"its worker failed ({type(error).__name__}: {error})")
+                yield failed_entry(job, f"the worker failed ({type(error).__name__}: {error})")
     finally:
         for future in futures:
             future.cancel()
@@ -217,7 +217,7 @@ def run_job(job: Job, version: str | None = None) -> Record:
     started = time.perf_counter()
     reuse_freed_memory_if_fixed()
     if version not in (None, VERSION):
-        return failed_entry(job, f"its worker has version {VERSION}, and not {version}; install that")
+        return failed_entry(job, f"the worker has version {VERSION}, and not {version}; install {version} there")
     status: Status = "skipped"
     more: Record = {}
     try:
@@ -253,7 +253,7 @@ def _doubts(job: Job, record: Record) -> list[str]:
     for part in parts_of(record):
         name = f"{part['mesh']['name']}: " if "maps" in record else ""
         if (escaped := part["report"]["escaped"]) > most:
-            found.append(f"{name}{escaped:.0%} of the rays have no exit, more than {most:.3g}")
+            found.append(f"{name}{escaped:.0%} of the rays found no exit, more than {most:.1%}")
         if part["range"] is None or part["range"]["max"] == 0:
             found.append(f"{name}the thickness is 0 everywhere")
     return found
@@ -286,7 +286,7 @@ def reported_values(record: Record, results: Any, folder: Path) -> Record:
 def in_processes(
     task: Callable[[Item], Result], items: list[Item], workers: int, lost: Callable[[Item], Result]
 ) -> Iterator[Result]:
-    """Results of a task for each item, as they come.
+    """Results of a task for each item, in the order in which they finish.
 
     Processes are spawned, not forked: OpenGL and threads do not survive a fork. When one dies (out of memory, or a
     crash in a library), what was running is done again, one item at a time; `lost` makes the result of an item whose
@@ -425,12 +425,12 @@ def reuse_freed_memory_if_fixed() -> None:
 
 
 def is_tiled(output: str | Path) -> bool:
-    """True if the name of a file asks for one file a tile."""
+    """True if the file name contains <UDIM>, so each tile gets a file."""
     return UDIM in Path(output).name
 
 
 def bake_tiles(job: Job, progress: Progress | None = None) -> tuple[Record, Results]:
-    """Bake all tiles that a model's texture coordinates lie in, those of all its materials, into a file each.
+    """Bake all UDIM tiles of a model into one file per tile.
 
     Parameters
     ----------
@@ -460,11 +460,11 @@ def bake_tiles(job: Job, progress: Progress | None = None) -> tuple[Record, Resu
     parts = _tiled_parts(job)
     tiles = sorted({tile for mesh, _, _ in parts for tile in tiles_of(mesh)} - {0})
     if not tiles:
-        found = "its texture coordinates are in no tile from 1001 on"
+        found = "no texture coordinates lie in a UDIM tile"
         raise InputError(
             f"output {job['output']!r}",
             found,
-            "the model has no UDIM tiles: remove <UDIM> from the name, or unwrap the model into tiles",
+            "remove <UDIM> from the name, or unwrap the model into tiles",
         )
     results: Results = {}
     rays = 0
@@ -496,7 +496,7 @@ def _tile_path(job: Job, tile: int) -> str:
 
 
 def _tiled_parts(job: Job) -> list[tuple[Mesh, Medium | None, Mesh | None]]:
-    """Meshes with their media, and the bodies that they are parts of: those of a glTF file that light enters."""
+    """Translucent meshes of a model with their media, and the bodies that they belong to."""
     unit, outside = job.get("unit", "m"), bool(job.get("outside"))
     if not has_parts(job):
         mesh = load_mesh(job["model"], unit=unit, allow_outside=outside)
@@ -515,7 +515,7 @@ def _tiled_parts(job: Job) -> list[tuple[Mesh, Medium | None, Mesh | None]]:
 
 
 def _merged(maps: Sequence[ThicknessMap]) -> ThicknessMap:
-    """Map of several meshes in one tile: where texels have a value of their own, that of the first mesh that has."""
+    """Map of several meshes in one tile; each texel takes its value from the first mesh that covers it."""
     whole = maps[0]
     for one in maps[1:]:
         new = one.coverage & ~whole.coverage

@@ -86,7 +86,7 @@ _CAPTION = 26  # pixels
 #: Errors of transmittance up to which a map looks so: what one sees in a picture alone, and beside the true one.
 VERDICTS = (
     (0.05, "looks right"),
-    (0.12, "looks similar; beside the true one the difference shows"),
+    (0.12, "looks similar, but the difference is visible side by side"),
     (float("inf"), "looks different; try --mode transmittance with a medium, more --rays, or trace rays at run time"),
 )
 
@@ -135,12 +135,12 @@ class MapCheck:
         off, bias = self.transmittance.rms, self.transmittance.bias
         sides = "" if abs(bias) < 0.5 * off else ", and too bright" if bias > 0 else ", and too dark"
         words = next(text for most, text in VERDICTS if off <= most)
-        return f"verdict: {words}: the light that passes is {off:.0%} off{sides}"
+        return f"verdict: {words}: the transmitted light is wrong by {off:.0%}{sides}"
 
     def __str__(self) -> str:
         scale = 100.0 / self.mean_thickness
         found, passed = self.thickness, self.transmittance
-        bare = f"\n{self.empty:.1%} of what is seen has no value in the map" if self.empty else ""
+        bare = f"\n{self.empty:.1%} of the visible surface has no value in the map" if self.empty else ""
         return (
             f"thickness      rms {found.rms:.4g} m, {scale * found.rms:.3g} % of the mean {self.mean_thickness:.4g} m; "
             f"median {found.median:.4g} m, p99 {found.p99:.4g} m, bias {found.bias:+.4g} m\n"
@@ -265,7 +265,7 @@ class FirstHits:
 
 
 def first_hits(mesh: Mesh, camera: Camera, size: tuple[int, int], body: Mesh | None = None) -> FirstHits:
-    """First hits on a mesh, but for those behind other parts of its body."""
+    """First hits on a mesh, without hits behind other parts of its body."""
     face, distance = _first_faces(mesh, camera, size)
     hit = face >= 0
     if body is not None:
@@ -319,7 +319,7 @@ def require_uv_of(corners: Corners, mesh: Mesh, path: Path) -> None:
         distance, _ = known.query(own, p=np.inf)
     others = float(np.mean(distance > SAME))
     if others > MOST_OTHERS:
-        found = f"{others:.0%} of its vertices have other texture coordinates in {str(path)!r}"
+        found = f"{others:.0%} of the vertices have other texture coordinates in {str(path)!r}"
         raise RenderError(
             requested, found, "the thickness map was not baked for this file; bake it again with --unwrap"
         )

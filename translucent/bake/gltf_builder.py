@@ -63,7 +63,7 @@ class GlbBuilder:
         self._path, self._allow_outside = file.path, file.allow_outside
         if file.chunks:
             if "uri" in (file.items("buffers") or [{}])[0]:
-                raise file.refused("its first buffer is a link", "export it as one .glb")
+                raise file.refused("the first buffer of the file is a link", "export the model as a single .glb")
             tree, data = copy.deepcopy(file.tree), file.resource({})
             self._rest = file.chunks[CHUNK.size + len(data) :]
         else:
@@ -296,7 +296,7 @@ def mesh_file(mesh: Mesh) -> GltfFile:
 
 
 def _split_at_edges(mesh: Mesh) -> tuple[Indices, Indices, npt.NDArray[np.float32]]:
-    """Vertices of the mesh to repeat where it has edges, faces of them, and a unit normal for each."""
+    """Vertices repeated along sharp edges: the mesh vertex of each, the new faces, and unit normals."""
     points = equal_rows(mesh.vertices)
     # Across a seam of the UVs the surface is as smooth as elsewhere.
     welded = Mesh(mesh.vertices[points.first], points.of[mesh.faces].astype(np.int32))

@@ -117,7 +117,7 @@ class Bodies:
         return None if joined is None else joined[0]
 
     def joined(self, key: PrimitiveKey) -> tuple[Mesh, int] | None:
-        """Body `around` an open primitive, and where its faces begin there; None of what stands alone."""
+        """Body `around` an open primitive, and the index of its first face there; None for a closed primitive."""
         if len(self._primitives(key[0])) == 1:  # the usual mesh, which need not be read and examined for that
             return None
         if self._outline(key).diagnosis.closed or (joined := self._join(key[0])) is None:
@@ -144,7 +144,7 @@ class Bodies:
         return [key for key in self._triangles if key[0] == index]
 
     def _join(self, index: int) -> tuple[Mesh, dict[PrimitiveKey, int]] | None:
-        """All open primitives of a mesh as one, and where the faces of each begin; None if that closes no edge."""
+        """All open primitives of a mesh joined, and the first face of each; None if joining closes no edge."""
         if index not in self._joined:
             parts = {key: self._outline(key) for key in self._primitives(index)}
             parts = {key: part for key, part in parts.items() if not part.diagnosis.closed}
@@ -185,7 +185,7 @@ def first_transforms(file: GltfFile) -> dict[int, Array]:
         known = first.setdefault(node["mesh"], matrix)
         if not np.allclose(_sizes(known), _sizes(matrix), rtol=SAME_SIZE, atol=SAME_SIZE * np.abs(_sizes(known)).max()):
             name = file.item("meshes", node["mesh"]).get("name", f"mesh {node['mesh']}")
-            text = f"glTF {str(file.path)!r}: nodes show {name!r} in several sizes; its map is that of the first"
+            text = f"glTF {str(file.path)!r}: nodes use {name!r} in several sizes; the map fits only the first"
             warnings.warn(text, TranslucentWarning, stacklevel=2)
     return first
 
@@ -196,7 +196,7 @@ def _sizes(matrix: Array) -> Array:
 
 
 def transformed(mesh: Mesh, matrix: Array, metres: float) -> Mesh:
-    """A mesh in metres, moved by a matrix in units of its file; a mirrored one is turned outwards again."""
+    """Mesh in metres, transformed by a matrix in units of its file; faces of a mirrored mesh are flipped."""
     vertices = mesh.vertices @ matrix[:3, :3].T + metres * matrix[:3, 3]
     faces = mesh.faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else mesh.faces
     return dataclasses.replace(mesh, vertices=vertices, faces=faces)
@@ -302,7 +302,7 @@ def find_targets(
             mesh = bodies.wound(key, mesh)
         found.append(Target(key, mesh, tex_coord, keeps, medium, made, around))
     if not found:
-        text = f"all that lets light in are thin walls without an inside: {', '.join(_names(file, list(lit)))}"
+        text = f"only thin walls let light in, and they have no inside: {', '.join(_names(file, list(lit)))}"
         raise file.refused(text, "give one of them a volume, or a closed mesh")
     return found
 

@@ -76,7 +76,7 @@ class InscribedSpheres:
         return 2.0 * radius
 
     def _descend(self, points: Points, pair: Integers, parent: Integers, level: int, radius: Array) -> None:
-        """Make spheres as small as the faces in boxes of a level allow, in pairs of a point and what these are in."""
+        """Shrink spheres by the bounding boxes of one tree level, for pairs of a point and a box."""
         boxes = self._tree.levels[level]
         most = MOST_PAIRS // boxes.width
         if len(pair) > most:
@@ -93,7 +93,7 @@ class InscribedSpheres:
         self._descend(points, pair, node, level + 1, radius)
 
     def _narrow(self, points: Points, pair: Integers, face: Integers, radius: Array) -> None:
-        """Make spheres as small as the middles of faces that count allow, in pairs."""
+        """Shrink spheres by the centers of faces, for pairs of a point and a face."""
         away = self._middles.take(face, axis=0)
         away -= points.start.take(pair, axis=0)
         along = -_dot(away, points.normal.take(pair, axis=0))
@@ -137,7 +137,7 @@ class InscribedSpheres:
 
 @dataclass(frozen=True, eq=False)
 class _Boxes:
-    """Boxes around faces that are neighbors along a curve, and planes before which all of these lie.
+    """Bounding boxes and bounding planes of groups of neighboring faces.
 
     Attributes
     ----------

@@ -136,7 +136,7 @@ def check_job(job: Job) -> None:
 
 
 def _settings(job: Job, diagonal: float) -> Job:
-    """The arguments of a bake, checked; shares are of the diagonal in metres."""
+    """Checked arguments of a bake; fractions of the diagonal are converted to metres."""
     given = dict(job.get("settings", {}))
     for key in _LENGTHS:
         if isinstance(given.get(key), str):

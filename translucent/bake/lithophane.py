@@ -43,7 +43,7 @@ _TABLED = 4097
 
 @dataclass(frozen=True, eq=False)
 class Lithophane:
-    """Relief of a picture, with what it shows before an even white light.
+    """Relief of a picture, and the picture that it shows in front of a uniform white light.
 
     Attributes
     ----------
@@ -93,10 +93,10 @@ class Lithophane:
 
     @checked
     def save_check(self, path: str | Path) -> None:
-        """Write a .png of what is requested, and beside it of what the relief shows; as bright as its colors allow."""
+        """Write a .png with the requested picture beside the picture that the relief shows."""
         requested = np.repeat(self.target[..., None], 3, axis=-1)
         most = max(1.0, float(requested.max()), float(self.shown.max()))
-        both = labeled(("asked for", look(requested / most)), ("as the relief shows it", look(self.shown / most)))
+        both = labeled(("requested", look(requested / most)), ("shown by the plate", look(self.shown / most)))
         write_atomically(Path(path), lambda temporary: both.save(temporary, format="PNG"))
 
 
@@ -140,11 +140,11 @@ def lithophane(
     least, largest = thickness
     if not (0 < least < largest < np.inf and 0 < pitch <= width / 2 < np.inf):
         thin, thick, wide_text, every = (f"{1e3 * metres:.6g} mm" for metres in (least, largest, width, pitch))
-        found = f"{thin} to {thick} thick, {wide_text} wide, points every {every}"
+        found = f"{thin} to {thick} thick, {wide_text} wide, with a point every {every}"
         raise InputError("lithophane", found, "give a smallest thickness, a larger one, and a width of several points")
     linear = read_picture(picture).linear if isinstance(picture, str | Path) else np.asarray(picture, dtype=np.float64)
     if linear.ndim != 3 or linear.shape[2] != 3 or not (linear.size and np.isfinite(linear).all()):
-        found = f"a picture of shape {linear.shape}, or not of finite numbers"
+        found = f"the picture has the shape {linear.shape}, or numbers that are not finite"
         raise InputError("lithophane", found, "give linear values (h, w, 3)")
     high, wide = linear.shape[:2]
     columns = round(width / pitch) + 1
@@ -168,9 +168,9 @@ def lithophane(
 
 
 def _passed(medium: Medium, least: float, largest: float) -> tuple[Array, Array]:
-    """Luminance of white light after tabled thicknesses, and these."""
+    """Table of thicknesses, and the luminance of white light that passes each."""
     if medium.scatters:
-        do = "give a filament's --td, or the color of a sample held before a light at its thickness"
+        do = "give the --td of a filament, or the color of light after a sample of known thickness"
         raise InputError(
             "lithophane", ("the medium scatters, so more light passes the plate than absorption alone predicts"), do
         )
@@ -214,7 +214,7 @@ def _plate(depth: Array, pitch: float) -> Mesh:
 
 
 def _rendered(mesh: Mesh, medium: Medium, size: tuple[int, int]) -> Array:
-    """Linear color of a plate before an even white light, seen from far before it."""
+    """Linear color of a plate in front of a uniform white light, seen from far away."""
     height = float(np.ptp(mesh.vertices[:, 1]))
     camera = Camera.orthographic((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), height=height)
     plain = Medium(absorption=medium.absorption)

@@ -48,7 +48,7 @@ CHUNK_RAYS = 1 << 19
 
 @dataclass(frozen=True, eq=False)
 class RayMean:
-    """The mean of a mode over rays, and its standard error.
+    """Thickness of a mode as a mean over rays, and its standard error.
 
     Parameters
     ----------
@@ -96,7 +96,9 @@ class RayMean:
         return self._transmittance(np.where(counted, length, np.inf), counted, edges)
 
     def _transmittance(self, length: Array, counted: npt.NDArray[np.bool_], edges: Integers) -> tuple[Array, Array]:
-        """As `estimate`. All transmittances are relative to that of the shortest ray, so that none vanishes."""
+        """Value and standard error in mode "transmittance"; see `estimate`. All transmittances are relative to that of
+        the shortest ray, so that none vanishes.
+        """
         assert self.extinction is not None
         shortest = length.min(axis=1)
         shortest = np.where(np.isfinite(shortest), shortest, 0.0)
@@ -135,7 +137,7 @@ def block_edges(begin: int, end: int, blocks: int) -> Integers:
 
 
 def _ratio(values: Array, counted: npt.NDArray[np.bool_] | None, edges: Integers) -> tuple[Array, Array]:
-    """Mean (k,) of the counted `values` (k, n), 0 where others stand, and its standard error (k,) from blocks.
+    """Mean (k,) of the counted `values` (k, n), which are 0 elsewhere, and its standard error (k,) from blocks.
 
     None: all are counted.
     """

@@ -521,7 +521,7 @@ def _tangents(normal: Array) -> tuple[Array, Array]:
 
 
 def _hash(points: Array, seed: int, sets: int) -> npt.NDArray[np.int64]:
-    """(k,): a set for each point, by its position alone."""
+    """(k,): index of the set of random numbers of each point, computed from its position."""
     cells = np.round(points / SAME_POINT).astype(np.int64).view(np.uint64)
     mixed = np.full(len(points), seed, dtype=np.uint64)
     for axis in range(3):

@@ -124,7 +124,7 @@ def write_record(path: Path, record: Record) -> Record:
 
 
 def add_record(files: OutputFiles, path: Path, record: Record) -> Record:
-    """Write a record where that of the file at `path` belongs, together with other files; returns the record."""
+    """Write the record of the file at `path` together with other files; returns the record."""
     from translucent.geometry.ray_caster import embree_versions
 
     versions = {"translucent": VERSION, "numpy": np.__version__, **embree_versions()}
@@ -150,7 +150,7 @@ def sidecar_of(path: Path) -> Path:
 
 
 def fingerprint(path: Path, filled: Path | None = None) -> Record:
-    """Name and hash of a file, as records have them, which may still be under another name."""
+    """Name and hash of a file for a record; the file may still have a temporary name."""
     return {"file": path.name, "sha256": file_hash(filled or path)}
 
 

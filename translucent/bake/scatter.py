@@ -1,4 +1,4 @@
-"""Baked light that bodies give off after scattering, as coefficients of the light around them, in maps or at vertices.
+"""Baked subsurface light of bodies, as coefficients of the light around them, in maps or at vertices.
 
 The body is solved for once for each spherical harmonic, and read at texels or vertices. Each file appears complete,
 with its record, or not at all:
@@ -81,14 +81,14 @@ BLOCK = 1 << 16
 
 
 def fill_scatter_exr(path: Path, values: Floats, coverage: Mask, meaning: Record) -> None:
-    """Write a map (h, w, 9, 3) as an OpenEXR file with what it means; raises `OSError` if it cannot be written."""
+    """Write a map (h, w, 9, 3) with its metadata as an OpenEXR file; raises `OSError` if it cannot be written."""
     channels = {name: values[:, :, i, k] for name, (i, k) in _CHANNELS.items()} | {"coverage.Y": coverage}
     header = {"comments": str(meaning["definition"]), "scatter": json.dumps(plain(meaning), ensure_ascii=False)}
     write_exr(path, channels, header)
 
 
 def read_scatter_exr(path: Path) -> tuple[Floats, Mask, Record]:
-    """Map (h, w, 9, 3), its coverage (h, w), and what it means, of a file that `fill_scatter_exr` wrote.
+    """Map (h, w, 9, 3), coverage (h, w) and metadata of a file that `fill_scatter_exr` wrote.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def write_scatter_glb(
     values: Mapping[PrimitiveKey, Floats],
     meanings: Mapping[PrimitiveKey, Record],
 ) -> None:
-    """Write a .glb whose vertices have these values (n, 9, 3), in the order of the file, and what they mean.
+    """Write a .glb whose vertices have these values (n, 9, 3), in the order of the file, with their metadata.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def _attributes(file: GltfFile, key: PrimitiveKey) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class BakedScatter:
-    """Common part of maps and of values at vertices.
+    """Base class of baked scattered light in maps and at vertices.
 
     Attributes
     ----------
@@ -187,7 +187,7 @@ class BakedScatter:
         return scattered_radiance(self.values, light)
 
     def meaning(self) -> Record:
-        """Description of the values and of what they were made for, as values that JSON can hold."""
+        """Metadata of the values, such as definition, medium and settings, as values that JSON can hold."""
         medium = self.medium
         return {
             "mode": "scatter",
@@ -384,7 +384,7 @@ def bake_scatter(
     pad(values, coverage, padding)
     said += unwrapped.warnings
     if overlapping:
-        said.append(f"{overlapping} texels lie in several triangles in UV; the first triangle has them")
+        said.append(f"{overlapping} texels lie in several triangles in UV space, and use the first triangle")
     _warn(mesh, said)
     return ScatterMap(
         values=values,
@@ -436,14 +436,14 @@ def bake_vertex_scatter(
 
 
 def _transfer(mesh: Mesh, medium: Medium, resolution: int, roughness: float) -> tuple[Transfer, list[str]]:
-    """Transfer of a body, and what to warn of."""
+    """Light transfer of a body: coefficients of the light that leaves it; and warnings."""
     mesh.require_finite()
     body = Object(mesh, medium=medium, surface=Surface(roughness=roughness))
     alone = LitAlone(body, resolution)
     depth = float((np.asarray(medium.scattering) * (1.0 - medium.anisotropy)).max() * body.mean_thickness)
     if depth > LEAST_DEPTH:
         return alone.transfer(), []
-    note = f"light is scattered {depth:.2g} times on its way through, where diffusion wants {LEAST_DEPTH:g} and more"
+    note = f"light is scattered only {depth:.2g} times inside the body; diffusion needs at least {LEAST_DEPTH:g}"
     return alone.transfer(), [note]
 
 

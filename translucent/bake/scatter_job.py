@@ -1,4 +1,4 @@
-"""Bakes of scattered light on files, and their check against the light that diffuses in pictures.
+"""Bake jobs of scattered light, and their check against diffusion in the renderer.
 
 Each body is baked alone, in the size in which the first node of a glTF file shows it and in its own axes: the linear
 part of a node's matrix is M = R S (polar decomposition), S is applied before, and light is to be turned by R^-1.
@@ -74,7 +74,7 @@ MAGNIFIED = 10.0
 
 @dataclass(frozen=True)
 class ScatterJob:
-    """Task of one bake: what, and how.
+    """Job of one bake of scattered light: model, output and settings.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class ScatterJob:
 
 @dataclass(frozen=True, eq=False)
 class Baked:
-    """Result of one body, and what it is a part of.
+    """Baked scattered light of one mesh, and the body that the mesh belongs to.
 
     Attributes
     ----------
@@ -213,7 +213,7 @@ def _stretches(builder: GlbBuilder) -> dict[int, Array]:
 
 @dataclass(frozen=True, eq=False)
 class ScatterLook:
-    """A body in one environment.
+    """Body in one environment, shaded with baked values and by diffusion.
 
     Attributes
     ----------
@@ -358,6 +358,6 @@ def _row(name: str, found: ScatterLook) -> Image.Image:
     difference = MAGNIFIED * np.abs(found.baked - found.true) / scale
     return labeled(
         (f"{name}: baked", displayed[0].astype(np.uint8)),
-        ("light that diffuses, as in pictures", displayed[1].astype(np.uint8)),
+        ("diffusion in the renderer", displayed[1].astype(np.uint8)),
         (f"difference, {MAGNIFIED:g} times", look(difference)),
     )

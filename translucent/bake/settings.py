@@ -1,4 +1,4 @@
-"""Settings of a bake, checked once; thickness as programs expect it: names of files, what they store, their import."""
+"""Settings of a bake, and the file names and encodings of thickness maps that other programs expect."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ DEFINITIONS: dict[Mode, str] = {
     "normal": "distance from the surface to the exit along the inward normal",
     "cone": "mean distance from the surface to the exit over the directions of a cone around the inward normal",
     "transmittance": "the distance at which the medium lets through as much as the mean over the cone",
-    "inscribed": "diameter of the largest sphere inside that touches the surface there",
-    "local": "share of the directions of a cone around the inward normal that go farther than the maximum distance",
+    "inscribed": "diameter of the largest sphere inside that touches the surface at this point",
+    "local": "fraction of the directions in a cone around the inward normal whose distance exceeds the maximum",
 }
 
 #: Largest size of a map, in texels along a side.
@@ -119,7 +119,7 @@ class BakeSettings:
         _check_count("size", self.size, 1, MAX_SIZE, "give the texels along a side, for example 1024")
         # One ray of many has no error estimate; mode "normal" has only one.
         _check_count("rays", self.rays, 1 if self.mode == "normal" else 2, MAX_RAYS, "give for example 64")
-        _check_count("supersample", self.supersample, 1, 16, "give 1 for none, or for example 2")
+        _check_count("supersample", self.supersample, 1, 16, "use a value such as 2, or 1 for no supersampling")
         _check_count("padding", self.padding, 0, MAX_SIZE, "give the texels around each chart, for example 16")
         _check_count("seed", self.seed, 0, 2**63 - 1, "give a whole number, for example 0")
         if not (_is_number(self.spread) and 0 < self.spread <= 180):
@@ -143,11 +143,11 @@ class BakeSettings:
                 "give a tile number from 1001 to 9999, or omit the tile",
             )
         if self.mode == "transmittance" and self.medium is None:
-            do = "give one, for example tl.Medium.from_color('#7b1e3a', 0.01), or --color '#7b1e3a' --distance 1cm"
+            do = "give a medium, such as tl.Medium.from_color('#7b1e3a', 0.01), or --color '#7b1e3a' --distance 1cm"
             raise InputError("mode 'transmittance'", "this mode needs a medium", do)
         if self.mode == "transmittance" and self.medium is not None and not (self.medium.extinction > 0).any():
-            found = "a medium that takes no light away"
-            raise InputError("mode 'transmittance'", found, "the medium must absorb or scatter light")
+            found = "the medium is clear"
+            raise InputError("mode 'transmittance'", found, "use a medium that absorbs or scatters light")
 
     @property
     def unit(self) -> str:
@@ -250,7 +250,7 @@ PROGRAMS = {
 
 
 def job_for(name: str, job: dict[str, Any]) -> dict[str, Any]:
-    """Bake job with the name and the encoding that a program expects; an output that is a folder gets its name.
+    """Bake job with the file name and the encoding that a program expects.
 
     Raises
     ------
@@ -264,7 +264,7 @@ def job_for(name: str, job: dict[str, Any]) -> dict[str, Any]:
         do = f"write {Path(program.name).suffix}, or give a folder"
         raise InputError(f"output {str(output)!r}", f"{name} reads {Path(program.name).suffix}", do)
     if other := [key for key in ("normalize", "invert", "vertices") if job.get(key)]:
-        found = f"--{other[0]} and --for exclude each other"
+        found = "--for already determines the encoding"
         raise InputError(f"--for {name}", found, f"omit --for or --{other[0]}")
     return {**job, "output": str(output), **program.storing}
 

@@ -85,7 +85,7 @@ class Projection:
         cage: Mesh | None,
         distance: float | None,
     ) -> Projection:
-        """For a `given` mesh that was `unwrapped`.
+        """Projection for a `given` mesh that was `unwrapped`.
 
         Raises
         ------
@@ -105,7 +105,7 @@ class Projection:
         return cls(low, high, corners, SEARCH * given.diagonal if distance is None else distance)
 
     def points(self, points: Points, weights: Array) -> tuple[Points, npt.NDArray[np.bool_]]:
-        """Points on the high mesh for those of the low one, and (k,) where one was found; only these are returned.
+        """Points on the detailed mesh for points on the coarse mesh, and (k,) whether one was found.
 
         Parameters
         ----------
@@ -348,7 +348,7 @@ def bake_key(settings: BakeSettings, *meshes: Mesh | None) -> str:
 def in_order(
     task: Callable[[Item], Result], items: Iterable[Item], threads: int, stop: threading.Event
 ) -> Generator[Result, None, None]:
-    """Results of a task for each item, in their order, as they come.
+    """Results of a task for each item, in the order of the items, each as soon as possible.
 
     Whatever ends the iteration early sets `stop`, which the task is to heed, and joins the threads.
     """

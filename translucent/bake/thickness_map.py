@@ -285,7 +285,7 @@ def save_map(
     values_only: bool = False,
     about: Record | None = None,
 ) -> Record:
-    """Write a thickness map, and beside it its record and, if it has new UVs, the mesh with them.
+    """Write a thickness map and its record, and, if it has new UVs, the mesh with these UVs.
 
     Parameters
     ----------
@@ -476,7 +476,7 @@ def write_maps(
             texture = builder.give_thickness(material, factor, levels, result.mesh, *uv)
             one |= {"material": material, "texture": texture, "thickness_factor": factor, "tex_coord": uv[0]}
         else:
-            one["warnings"] = ["no thickness: its material is left as it is"]
+            one["warnings"] = ["the thickness is 0, so the material stays unchanged"]
         records.append(one)
     if not any("material" in one for one in records):
         raise InputError(

@@ -143,7 +143,7 @@ def check_usd_output(path: Path) -> None:
 
 
 def _pxr(*names: str) -> list[Any]:
-    """Modules of OpenUSD, whose package is there."""
+    """Modules of OpenUSD; its package must be installed."""
     return [import_module(f"pxr.{name}") for name in names]
 
 
@@ -212,7 +212,7 @@ def _add_material(stage: Any, path: str, item: Object, mesh: Any) -> Any:
 
 
 def _base_texture(item: Object) -> Texture | None:
-    """Texture of the base color of what is opaque."""
+    """Base color texture of an opaque object."""
     known = item.medium is None and item.surface is not None and item.mesh.uv is not None
     return item.surface.color_texture if known and item.surface is not None else None
 
@@ -315,7 +315,7 @@ def _sky(environment: Environment) -> Array:
 
 
 def _shine(light: Any, power: Array) -> None:
-    """Intensity, and color below 1, of a light."""
+    """Set the intensity and the normalized color of a light."""
     (gf,) = _pxr("Gf")
     most = float(power.max()) or 1.0
     light.CreateIntensityAttr(most)
@@ -323,16 +323,16 @@ def _shine(light: Any, power: Array) -> None:
 
 
 def _left_out(scene: Scene) -> list[tuple[list[Object], str]]:
-    """Objects with what a stage here does not hold."""
+    """Groups of objects with a feature that the USD stage cannot store."""
     default = Surface()
     if scene.environment.kind == "checkerboard":
-        found = "a checkerboard environment: it is fixed to the picture, and domes of stages surround the scene"
+        found = "a checkerboard environment belongs to the picture, and a USD dome light surrounds the scene"
         warnings.warn(f"{found}; it is not written", TranslucentWarning, stacklevel=4)
     groups = [
-        ([item for item in scene.objects if item.density is not None], "densities that vary"),
-        ([item for item in scene.objects if item.medium is not None and item.medium.emits], "media that emit"),
-        ([item for item in scene.objects if _other_textures(item)], "textures but those of base colors"),
-        ([item for item in scene.objects if item.mesh.colors is not None], "colors of vertices"),
+        ([item for item in scene.objects if item.density is not None], "varying densities"),
+        ([item for item in scene.objects if item.medium is not None and item.medium.emits], "media that emit light"),
+        ([item for item in scene.objects if _other_textures(item)], "textures other than base colors"),
+        ([item for item in scene.objects if item.mesh.colors is not None], "vertex colors"),
     ]
     for name in ("clearcoat", "iridescence", "dispersion"):
         some = [

@@ -1,4 +1,4 @@
-"""Scenes on which methods are compared: of the toolkit, each hard on something, and of models of the user."""
+"""Scenes on which methods are compared: built-in scenes, each hard in one respect, and models of the user."""
 
 from __future__ import annotations
 

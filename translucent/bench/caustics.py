@@ -382,7 +382,7 @@ def milk() -> Scene:
 
 @dataclass(frozen=True)
 class MediumScene(LightScene):
-    """Scene of a caustic in a medium: paths of each pixel in each half of its truth; rows and columns that count."""
+    """Scene of a caustic in a medium, the number of paths of its truth, and the measured part of the picture."""
 
     paths: int = 192
     counted: tuple[slice, slice] = (slice(9, 20), slice(4, 20))

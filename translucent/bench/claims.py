@@ -189,7 +189,7 @@ def _off(shortcut: str) -> Callable[[CaseRecord], Verdict | None]:
 
 
 def _beside(case: CaseRecord, shortcut: str) -> tuple[float, float] | None:
-    """Error of a shortcut as a multiple of that of signed depth, and by itself."""
+    """Error of a shortcut, and its ratio to the error of signed depth."""
     rows = _row(case, "SignedDepth"), _row(case, shortcut)
     errors = [None if row is None else error_of(row, case.quantity) for row in rows]
     ours, theirs = errors

@@ -114,7 +114,7 @@ _PATHS = (2, 4, 16)
 
 @dataclass(frozen=True, kw_only=True)
 class Contender:
-    """Method of the public API, or a technique beside it: one row of every case that it fits.
+    """Method of the public API, or a technique of another renderer: one row in each case that it can render.
 
     Attributes
     ----------
@@ -404,7 +404,7 @@ def _in_order() -> Iterable[Contender]:
 
 
 def _with_interfaces() -> Iterable[Contender]:
-    """Treatments of interfaces; and what viewers of glTF do, one interface before a constant thickness."""
+    """Contenders for interfaces, including glTF viewers: one interface in front of a constant thickness."""
     made = partial(Contender, effects=_INTERFACES)
     front, screen = FrontInterface(), ScreenInterfaces()
     yield made(
@@ -441,7 +441,7 @@ def _with_interfaces() -> Iterable[Contender]:
 
 
 def _with_scattering() -> Iterable[Contender]:
-    """Treatments of light that is scattered many times, and what engines show of it."""
+    """Contenders for multiple scattering, including the approximations of game engines."""
     often: dict[str, Any] = {"effects": _SCATTERING, "pictured": _SCATTERING}
     for engine in (PaintLayer(), NormalizedDiffusion(), Frostbite()):
         yield Contender(
@@ -459,7 +459,7 @@ def _with_scattering() -> Iterable[Contender]:
 
 
 def _planned() -> Iterable[Contender]:
-    """What the planner chooses."""
+    """Contender that the planner chooses."""
     said = "no bound: its notes say what is left out"
     lit: tuple[Effect, ...] = ("all light",)
     yield Contender(name=PLANNED, family=PLANNED, effects=lit, pictured=lit, choices={"method": None}, said=said)

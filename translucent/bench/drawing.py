@@ -144,11 +144,11 @@ class BenchContext:
         self._light: dict[Diffusion, DiffusionCache] = {}
 
     def step(self, name: PassName) -> Pass:
-        """Pass with this name in plans: that of the renderer, as another would compile its programs again."""
+        """The renderer's pass with this name in plans, so that no program is compiled twice."""
         return self.renderer.gpu.step(PASSES[name])
 
     def own(self, kind: Callable[[Any], Made]) -> Made:
-        """Object that no plan has, such as a shortcut's pass: made of the context once, and kept."""
+        """Object outside plans, such as the pass of a shortcut, created once per context and cached."""
         if kind not in self._own:
             self._own[kind] = kind(self.gl)
         return cast("Made", self._own[kind])

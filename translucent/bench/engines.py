@@ -1,4 +1,4 @@
-"""Engines' treatments of light that is scattered many times, as counter-examples: their shaders, in NumPy.
+"""Approximations of multiple scattering in game engines, as counter-examples: their shaders, in NumPy.
 
 Each takes reflections at the interface, and unscattered light, from our own frames: only the scattering differs.
 Shadows of the body on itself are exact.
@@ -123,7 +123,7 @@ class VisiblePoints:
         return np.asarray(found)
 
     def frame(self, light: Array) -> Frame:
-        """The base with this light (k, 3) that leaves the surface."""
+        """The base frame with this light (k, 3) added at the surface."""
         radiance = self.base.radiance.copy()
         radiance.reshape(-1, 3)[self.pixels] += light.astype(np.float32)
         return dataclasses.replace(self.base, radiance=radiance)
@@ -182,7 +182,7 @@ def cosine_directions(normals: Array) -> Array:
 
 @dataclass(frozen=True)
 class Engine:
-    """Treatment that engines give to light that is scattered many times; name and promise are those of its row."""
+    """Approximation of multiple scattering in a game engine."""
 
     name: ClassVar[str]
     promise: ClassVar[str]

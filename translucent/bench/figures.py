@@ -324,7 +324,7 @@ def standalone(svg: str) -> str:
 
 
 def shortened(text: str) -> str:
-    """A name that fits into a plot, and that a font can show; tables and tooltips have all of it."""
+    """Name shortened for a plot."""
     text = printable(text)
     return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
 

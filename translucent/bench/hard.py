@@ -371,7 +371,7 @@ def _units(checks: Checks) -> None:
 
 @hard("H11", "90 and 150 degrees of view, corner pixels", f"{EXACTLY}, relative to each path", unit="relative")
 def _angles(checks: Checks) -> None:
-    """Corner pixels included: a wall so wide that it fills the picture."""
+    """Wall so wide that it fills the picture, corner pixels included."""
     wall = Box((-60, -60, -1.5), (60, 60, -1)).tessellate()
     for fov in (90.0, 150.0):
         scene = Scene([Object(wall, GLASS)], Camera.look_at((0, 0, 0), (0, 0, -1), fov_y=fov))

@@ -119,8 +119,8 @@ NODES, BODIES, MEDIA = 2000, 300, 60
     unit="of the power",
 )
 def _hollow(checks: Checks) -> None:
-    """Balance of a lossless wall, which lets out all that the light inside sends, but for what passes unscattered: so
-    seen from afar the mean radiance of the ball is its intensity over the area of the disk.
+    """Energy balance of a hollow, lossless ball: its mean radiance from afar is the intensity of the light inside over
+    the area of the disk, without light that passes unscattered.
     """
     side, height = 48, 2.2
     camera = Camera.orthographic((0, 0, 4), (0, 0, 0), height=height)
@@ -142,7 +142,7 @@ def _hollow(checks: Checks) -> None:
     unit="of the light around",
 )
 def _thin_part(checks: Checks) -> None:
-    """A plate beside a ball, in light of 1 from all sides: what its middle sends along its normal is known."""
+    """Plate beside a ball in uniform light, with a known radiance along the normal of its middle."""
     ball, thickness = Sphere((1.0, 0.0, 0.0), 0.45).tessellate(48), 0.01
     plate = Box((-0.5, -0.5, -thickness / 2), (0.5, 0.5, thickness / 2)).tessellate()
     mesh = joined([(ball.vertices, ball.faces), (plate.vertices, plate.faces)], "ball and plate")
@@ -161,7 +161,7 @@ def _thin_part(checks: Checks) -> None:
 
 
 def _sent(albedo: float, depth: float) -> float:
-    """Radiance along the normal of a slab in light of 1 from all sides, by adding and doubling."""
+    """Radiance along the normal of a slab in uniform light of radiance 1, by adding and doubling."""
     mu, weight = slabs.cosines(1.0)
     back, on = slabs.bare(albedo, depth, mu, weight)
     steep = (back + on).sum(axis=1)[-4:]
@@ -272,7 +272,7 @@ def _shadow_opaque(checks: Checks) -> None:
 
 
 def _lost(checks: Checks, ball: Mesh) -> Array:
-    """Light that a ball takes from its own lit side, where it faces the light by more than a few degrees."""
+    """Self-shadowing error: light that is missing on the lit side of a ball, away from the terminator."""
     camera = Camera.look_at((3.0, 3.0, 3.0), (0.0, 0.0, 0.0), fov_y=25.0)
     sun = DirectionalLight((1.0, -1.5, -0.4), 1.0)
     scene = Scene([Object(ball, color=(1.0, 1.0, 1.0)), placed(ball, WINE, (0, -3.0, 0))], camera, [sun], DARK)

@@ -1,4 +1,4 @@
-"""Scenes in which light goes between things: grounds and bodies, bodies in one another, leaves, fog, and a glow.
+"""Scenes in which light travels between objects: grounds and bodies, nested bodies, leaves, fog and emission.
 
 Their truth is made of random paths (`PathTraced`), which agree with Mitsuba 3 on such scenes.
 """
@@ -94,7 +94,7 @@ def ball_in_soap() -> Scene:
 
 
 def neon() -> Scene:
-    """Ring that glows, absorbs, scatters and refracts."""
+    """Ring that emits, absorbs, scatters and refracts light."""
     medium = Medium((0.8, 0.5, 0.3), (1.2, 1.4, 1.8), (0.9, 0.35, 0.1), anisotropy=0.2, ior=1.4)
     camera = Camera.look_at((0.5, 2.2, 3.0), (0.0, 0.0, 0.0), fov_y=36.0)
     return Scene([Object(Torus(0.8, 0.3).tessellate(48), medium)], camera, (), DUSK)

@@ -328,7 +328,7 @@ class CostScaling(Experiment[ScalingStep]):
         return found
 
     def added(self, report: Report, record: Sequence[Series]) -> Report:
-        """The report with a point more in each series."""
+        """The report with one more point in each series."""
         series = {(one.axis, one.method): one for one in report.scaling}
         for new in record:
             old = series.get((new.axis, new.method), dataclasses.replace(new, points=()))

@@ -204,7 +204,7 @@ def _decades(first: int, last: int, steps: Sequence[float], low: float, high: fl
 
 
 def _guides(axes: Axes, floor: float | None) -> None:
-    """The floor, and below what errors are float32's own; milliseconds above."""
+    """Draw guide lines: the time of the floor, the float32 error, and an axis of milliseconds."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
     bottom = axes.get_ylim()[0]
@@ -225,7 +225,7 @@ def _guides(axes: Axes, floor: float | None) -> None:
 
 
 def _frontier(axes: Axes, rows: Sequence[MethodRow], points: Array) -> None:
-    """Steps through the rows that no other beats: all above and right of them costs more or errs more."""
+    """Draw the Pareto frontier as steps."""
     on = np.array([row.pareto for row in rows], dtype=bool)
     if not on.any():
         return
@@ -239,7 +239,7 @@ def _frontier(axes: Axes, rows: Sequence[MethodRow], points: Array) -> None:
 
 
 def _symbol(axes: Axes, row: MethodRow, point: Array, gid: str) -> None:
-    """Filled for methods, hollow for counter-examples, ringed on the frontier."""
+    """Draw the symbol of a row: filled for methods, hollow for counter-examples, ringed on the frontier."""
     style = style_of(row.family)
     color, paper = placeholder(style.color), placeholder("paper")
     filled = row.kind in ("method", "cpu")
@@ -465,7 +465,7 @@ def _lines(axes: Axes, lines: Mapping[str, Sequence[tuple[int, float]]]) -> list
 
 
 def _bar(axes: Axes, height: float, name: str) -> None:
-    """A line that errors must stay below."""
+    """Draw the limit that errors must stay below."""
     axes.axhline(height, color=placeholder("muted"), linestyle=(0, (4, 3)), linewidth=1.2)
     at = {"xycoords": ("axes fraction", "data"), "xytext": (4, 3), "textcoords": "offset points"}
     axes.annotate(name, (0.0, height), **at, color=placeholder("muted"), size=FONT_SIZE - 1)

@@ -47,7 +47,7 @@ Progress = Callable[[str, int, int], None]
 
 
 def experiments(quick: bool, extra: Sequence[Case] = (), methods: Sequence[str] = ()) -> tuple[Experiment[Any], ...]:
-    """All experiments of a report, in its order; in haste where `quick`, as `measure_all` has it."""
+    """All experiments of a report, in order; shorter ones if `quick`."""
     if not quick:
         return (
             MethodComparison((*extra, *CASES), methods),

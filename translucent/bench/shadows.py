@@ -441,7 +441,7 @@ class Ground:
         return np.asarray(self._drawn(scene, size).radiance, np.float64)
 
     def _relative(self, radiance: Array) -> Array:
-        """Radiance of the ground as a fraction of that with nothing in the light."""
+        """Radiance of the ground, divided by the radiance without shadows."""
         lit = self.bare > 0
         return np.where(lit, radiance / np.where(lit, self.bare, 1.0), 1.0)
 

@@ -280,7 +280,7 @@ def picture_of(
 
 @dataclass(frozen=True)
 class StoredTruth:
-    """Truth of a scene as the package brings it: two independent estimates of its radiance, with noise.
+    """Stored truth of a scene: two independent, noisy estimates of its radiance.
 
     Attributes
     ----------
@@ -318,7 +318,7 @@ class StoredTruth:
 
     @classmethod
     def by_opengl(cls, renderer: Renderer, scene: Scene, size: Size, paths: int) -> StoredTruth:
-        """The same by `PathTraced`."""
+        """Path trace two independent halves of a scene by `PathTraced` on the GPU."""
         began = time.perf_counter()
         found = [renderer.render(scene, size, PathTraced(paths, seed)) for seed in (1, 2)]
         seconds = time.perf_counter() - began

@@ -55,7 +55,9 @@ ALL: frozenset[Feature] = frozenset(FEATURES)
 
 
 class SceneNotSupportedError(Exception):
-    """A scene that a renderer lacks words or features for; the message says which. It is not counted as a failure."""
+    """Error for a scene that a renderer cannot represent or render; the message says why. It is not counted as a
+    failure.
+    """
 
 
 class Rendered(NamedTuple):
@@ -67,7 +69,7 @@ class Rendered(NamedTuple):
 
 
 class Session(NamedTuple):
-    """A renderer that has been started: what draws a scene out of its folder, its version and its device."""
+    """Started renderer: its function that draws a scene, its version and its device."""
 
     draw: Callable[[BenchmarkScene, Path], Rendered]
     version: str
@@ -101,7 +103,7 @@ class Adapter:
     def lacks(self, scene: BenchmarkScene) -> str:
         """Features of a scene that it does not have, in words; empty if it has all."""
         lacking = [name for name in scene.needs if name not in self.features]
-        return f"it has no {', '.join(lacking)}" if lacking else ""
+        return f"the renderer has no {', '.join(lacking)}" if lacking else ""
 
 
 def run_adapter(
@@ -225,7 +227,7 @@ def _mitsuba(paths: int) -> Adapter:
 
         yield Session(draw, mitsuba.__version__, f"variant {variant}, {os.cpu_count()} threads")
 
-    settings = f"volpathmis without a limit of depth, {paths} paths for each pixel, box filter"
+    settings = f"volpathmis without a depth limit, {paths} paths per pixel, box filter"
     features = ALL - {"emission", "sheets"}
     return Adapter(f"mitsuba-{paths}", f"Mitsuba 3, {paths} paths", settings, features, missing, start)
 
@@ -239,9 +241,11 @@ def _blender(engine: str, samples: int, title: str, settings: str, features: fro
 
     def missing() -> str:
         if python:
-            return "" if shutil.which(python) else f"BLENDER_PYTHON is {python!r}, which is no program; name a Python"
+            return (
+                "" if shutil.which(python) else f"BLENDER_PYTHON is {python!r}, which is not a program; name a Python"
+            )
         if importlib.util.find_spec("bpy") is None:
-            return "bpy is not installed; pip install bpy, or BLENDER_PYTHON=/path/to/a/python that has it"
+            return "bpy is not installed; pip install bpy, or set BLENDER_PYTHON to a Python with bpy"
         return ""
 
     @contextmanager
@@ -306,7 +310,7 @@ _GLTF = frozenset[Feature]({"absorption", "refraction", "roughness", "shadows"})
 
 
 def _gvxr() -> Adapter:
-    """The L-buffer of gVirtualXRay: thickness alone."""
+    """Adapter of gVirtualXRay, whose L-buffer contains only thickness."""
 
     def missing() -> str:
         if importlib.util.find_spec("gvxrPython3") is None:
@@ -324,7 +328,7 @@ def _gvxr() -> Adapter:
         def draw(scene: BenchmarkScene, _: Path) -> Rendered:
             made = scene.make()
             if not scene.thickness or made.overlap != "add":
-                raise SceneNotSupportedError("it has thickness alone, no light")
+                raise SceneNotSupportedError("the renderer computes only thickness")
             camera, (width, height) = made.camera, scene.size
             reach = float((made.boxes.reshape(-1, 3) - camera.eye @ np.eye(3)).dot(camera.forward).max())
             away = 1.05 * reach
@@ -357,7 +361,7 @@ def _gvxr() -> Adapter:
         yield Session(draw, version, gvxr.getOpenGlRenderer())
         gvxr.destroyAllWindows()
 
-    settings = "L-buffer of each body, one ray for each pixel"
+    settings = "L-buffer of each body, one ray per pixel"
     return Adapter("gvxr", "gVirtualXRay", settings, frozenset({"absorption"}), missing, start)
 
 
@@ -365,7 +369,9 @@ def _gvxr() -> Adapter:
 
 
 def _pyrender() -> Adapter:
-    """The rasterizer pyrender: each body with one opacity and one glow, so that white behind it has its color."""
+    """Adapter of the rasterizer pyrender: each body has one opacity and one emission, so a white background gets the
+    color of the body.
+    """
 
     def missing() -> str:
         found = importlib.util.find_spec("pyrender") is not None
@@ -378,7 +384,7 @@ def _pyrender() -> Adapter:
         def draw(scene: BenchmarkScene, _: Path) -> Rendered:
             made = scene.make()
             if made.environment.kind != "constant" or made.opaque:
-                raise SceneNotSupportedError("its background has one color, and bodies do not change other objects")
+                raise SceneNotSupportedError("the renderer supports only a constant background and no opaque objects")
             drawn = pyrender.Scene(bg_color=np.ones(4), ambient_light=np.zeros(3))
             for item in made.bodies:
                 assert item.medium is not None
@@ -413,7 +419,7 @@ def _pyrender() -> Adapter:
 
         yield Session(draw, str(pyrender.__version__), "OpenGL")
 
-    settings = "alpha blending by the mean chord of each body, unlit, 8 bits, 16 samples"
+    settings = "alpha blending by the mean thickness of each body, unlit, 8 bits, 16 samples"
     return Adapter("pyrender", "pyrender", settings, frozenset({"absorption"}), missing, start)
 
 
@@ -433,12 +439,17 @@ _SCREEN = "64 samples, screen-space ray tracing at full resolution, finest volum
 _NOT_NESTED = ALL - {"nesting", "sheets"}
 
 _ADAPTERS: tuple[Adapter, ...] = (
-    _ours("ours", "translucent", "what the planner chooses, 16 samples for each pixel", samples=16),
-    _ours("ours-quick", "translucent, 1 sample", "what the planner chooses, 1 sample: a frame that moves", samples=1),
+    _ours("ours", "translucent", "default settings, 16 samples per pixel", samples=16),
+    _ours(
+        "ours-quick",
+        "translucent, 1 sample",
+        "default settings, 1 sample per pixel",
+        samples=1,
+    ),
     _ours(
         "ours-screen",
         "translucent, screen space",
-        "interfaces in screen space and layers of scattering: without rays or diffusion",
+        "interfaces in screen space, scattering in layers: no ray tracing, no diffusion",
         samples=4,
         interfaces=ScreenInterfaces(),
         scattering=ScatteringLayer(),
@@ -446,7 +457,7 @@ _ADAPTERS: tuple[Adapter, ...] = (
     _ours(
         "ours-front",
         "translucent, front interface",
-        "no ray goes on behind the first interface",
+        "rays are refracted only at the first interface",
         samples=4,
         interfaces=FrontInterface(),
         scattering=SingleScattering(),

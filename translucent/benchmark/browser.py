@@ -60,23 +60,25 @@ class WebRenderer:
     packages: dict[str, str]
 
     def missing(self) -> str:
-        """Why it cannot run here; empty if it can."""
+        """Reason why the renderer cannot run on this machine; empty if it can."""
         if chromium() is None:
-            return "no Chromium here; apt-get install chromium, or CHROMIUM=/path/to/it"
+            return "Chromium is not installed; apt-get install chromium, or set CHROMIUM to its path"
         absent = [name for name in self.npm() if not (npm_folder() / "node_modules" / name).is_dir()]
         if absent:
-            return f"{', '.join(absent)} not in {npm_folder()}; npm install --prefix {npm_folder()} {' '.join(absent)}"
+            return (
+                f"{', '.join(absent)} missing in {npm_folder()}; npm install --prefix {npm_folder()} {' '.join(absent)}"
+            )
         if importlib.util.find_spec("playwright") is None:
             return "playwright is not installed; pip install playwright"
         return ""
 
     def npm(self) -> list[str]:
-        """Names of its packages."""
+        """Names of the renderer's npm packages."""
         paths = [path.split("/") for path in self.packages.values()]
         return sorted({"/".join(parts[: 2 if parts[0].startswith("@") else 1]) for parts in paths})
 
     def version(self) -> str:
-        """Version of its first package."""
+        """Version of the renderer's first npm package."""
         told = npm_folder() / "node_modules" / self.npm()[0] / "package.json"
         return str(json.loads(told.read_text(encoding="utf-8"))["version"])
 
@@ -100,7 +102,7 @@ class WebSession:
         self.folder = Path()
 
     def draw(self, scene: BenchmarkScene, folder: Path) -> tuple[npt.NDArray[np.float32], float | None]:
-        """Linear radiance (h, w, 3) of a scene out of its folder, and its seconds, if it tells."""
+        """Linear radiance (h, w, 3) of a scene in a folder, and its seconds, if the page measures them."""
         self.folder = folder
         self._errors.clear()
         width, height = scene.size

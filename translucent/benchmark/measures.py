@@ -202,10 +202,10 @@ def _best_shift(picture: Array, right: Array) -> tuple[int, int]:
 _SUSPECTS = (
     _Suspect("flipped upside down: row 0 is the top row", lambda p: p[::-1]),
     _Suspect("mirrored left to right", lambda p: p[:, ::-1]),
-    _Suspect("turned by half a turn", lambda p: p[::-1, ::-1]),
+    _Suspect("rotated by 180 degrees", lambda p: p[::-1, ::-1]),
     _Suspect("red and blue are exchanged", lambda p: p[..., ::-1]),
     _Suspect("sRGB-encoded, not linear: save radiance without a transfer function", _to_linear),
-    _Suspect("linearized once too often: the values were taken for sRGB and decoded", _to_srgb),
+    _Suspect("decoded from sRGB although the values were already linear", _to_srgb),
 )
 
 
@@ -230,15 +230,15 @@ def suspicions(picture: Array, truth: TruthPicture) -> list[str]:
     if product > 0 and abs(math.log2(factor := product / square)) > STOPS:
         other = "brighter" if factor > 1 else "darker"
         stops = abs(math.log2(factor))
-        said = f"exposure may be off: at {stops:.2g} stops {other} the error halves"
+        said = f"the exposure may be wrong: with {stops:.2g} stops {other}, the error is half as large"
         found.append((off(factor * picture), said))
     down, across = _best_shift(picture, right)
     if math.hypot(down, across) > SHIFTED:
-        said = f"shifted by {across} pixels to the right and {down} down"
-        found.append((off(_moved(picture, down, across)), said.replace(f"{across} ", f"{-across} ", 1)))
+        said = f"shifted by {-across} pixels to the right and {-down} pixels down"
+        found.append((off(_moved(picture, down, across)), said))
     for zoom in ZOOMS:
-        how = "smaller: more is seen" if zoom > 1 else "larger: a part is seen"
-        said = f"cropped or another field of view: things are {1 / zoom:.2g} times as large, {how}"
+        how = "because the field of view is too large" if zoom > 1 else "because the field of view is too small"
+        said = f"cropped, or another field of view: objects are {1 / zoom:.2g} times as large, {how}"
         found.append((off(_zoomed(picture, zoom)), said))
     after, said = min(found, key=lambda one: one[0])
     return [said] if after < SUSPICIOUS * before else []

@@ -65,7 +65,7 @@ def table_of(results: Results) -> str:
 def _line(one: SceneResult) -> str:
     if one.score is None:
         return "  " + (
-            f"not supported: {one.lacking}" if one.lacking else one.failure or "no truth of it yet, or no picture"
+            f"not supported: {one.lacking}" if one.lacking else one.failure or "no picture, or no true picture"
         )
     score = one.score
     thick = "" if score.thickness is None else f"{score.thickness.p99:.1e}"
@@ -103,7 +103,7 @@ class PageRow:
 
     @property
     def ratio(self) -> float | None:
-        """Seconds by the floor's."""
+        """Render time divided by the floor's."""
         one = self.result
         return one.seconds / one.floor if one.seconds and one.floor else None
 
@@ -122,7 +122,7 @@ class ScenePart:
 
     @property
     def ours(self) -> PageRow | None:
-        """Row of this toolkit as it chooses by itself."""
+        """Row of this toolkit with default settings."""
         return next((row for row in self.rows if row.name == OURS and row.result.score is not None), None)
 
     @property
@@ -198,7 +198,7 @@ def _place(number: int, parts: Sequence[ScenePart]) -> float:
 
 
 def _times(number: int, parts: Sequence[ScenePart]) -> float | None:
-    """Median time of a renderer by the floor's."""
+    """Median time of a renderer, divided by the floor's."""
     found = [row.ratio for part in parts for row in part.rows if row.number == number and row.ratio]
     return statistics.median(found) if found else None
 

@@ -48,7 +48,7 @@ from translucent.version import VERSION
 FORMAT = "translucent benchmark results 1"
 
 #: What times are compared with, on every machine.
-FLOOR = "one ray through each pixel to the nearest surface (Embree, NumPy), on the processor of that machine"
+FLOOR = "one ray through each pixel to the nearest surface (Embree, NumPy), on the processor"
 
 #: Suffixes of pictures, in the order in which they are looked for.
 SUFFIXES = (".exr", ".npy")
@@ -188,7 +188,7 @@ def read_results(folder: Path) -> Results:
 
 
 def _text(value: Any) -> str:
-    """Text of a stranger in one line that is not too long."""
+    """Untrusted text as one line of limited length."""
     return printable(" ".join(str(value).split()))[:LONGEST] if isinstance(value, str | int | float) else ""
 
 
@@ -256,13 +256,13 @@ def read_picture(folder: Path, scene: BenchmarkScene) -> Array:
     path = picture_path(folder, scene.name)
     asked = f"picture {scene.name!r}"
     if path is None:
-        do = f"name it {scene.name}{SUFFIXES[0]} or {SUFFIXES[1]}"
-        raise InputError(asked, f"not in {str(folder)!r}", do)
+        do = f"name the file {scene.name}{SUFFIXES[0]} or {SUFFIXES[1]}"
+        raise InputError(asked, f"no such file in {str(folder)!r}", do)
     if path.suffix == ".exr":
         _, channels = read_exr(path, asked)
         missing = [name for name in "RGB" if name not in channels]
         if missing:
-            raise InputError(asked, f"it has channels {', '.join(channels)}", "name the channels R, G and B")
+            raise InputError(asked, f"the file has the channels {', '.join(channels)}", "name the channels R, G and B")
         array = np.stack([channels[name] for name in "RGB"], axis=-1)
     else:
         array = _npy(path, asked)
@@ -283,14 +283,16 @@ def read_thickness(folder: Path, scene: BenchmarkScene) -> Array | None:
     found = next(iter(read_exr(path, asked)[1].values())) if path.suffix == ".exr" else _npy(path, asked)
     array = np.asarray(found, np.float64)
     if array.shape != scene.size[::-1]:
-        raise InputError(asked, f"its shape is {array.shape}", f"render {scene.size[1]} rows of {scene.size[0]}")
+        raise InputError(
+            asked, f"the array has the shape {array.shape}", f"render {scene.size[1]} rows of {scene.size[0]}"
+        )
     return array
 
 
 def _fitted(array: Array, scene: BenchmarkScene, asked: str) -> Array:
     width, height = scene.size
     if array.ndim != 3 or array.shape[-1] < 3 or array.dtype.kind != "f":
-        found = f"an array of shape {array.shape} of {array.dtype}"
+        found = f"the array has the shape {array.shape} and the type {array.dtype}"
         raise InputError(asked, found, "save linear radiance as floats, in an array of height x width x 3")
     times = array.shape[0] // height
     if times < 1 or array.shape[:2] != (times * height, times * width):
@@ -381,7 +383,7 @@ def _is_ours(name: str) -> bool:
 
 
 def unpacked(path: Path, folder: Path) -> Path:
-    """Take the files of a .zip of results that belong there into a folder; raises `InputError` if it is none."""
+    """Unpack the known files of a .zip of results into a folder; raises `InputError` for other files."""
     asked = f"results {str(path)!r}"
     try:
         with zipfile.ZipFile(path) as archive:

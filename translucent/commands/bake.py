@@ -99,7 +99,7 @@ class BakeOptions:
     mode: str = option(
         "cone",
         type=click.Choice(MODES),
-        help="Definition of thickness, or scattered light.",
+        help="cone: mean thickness over a cone of rays. normal: along the normal. scatter: scattered light.",
     )
     size: int = option(
         1024, metavar="N", help=f"Number of texels along each side of the map; default with --mode scatter: {SIZE}."
@@ -195,11 +195,11 @@ class BakeOptions:
 @click.argument("models", nargs=-1, required=True, metavar="MODEL...")
 @takes(BakeOptions)
 def bake(models: tuple[str, ...], given: BakeOptions, as_json: bool) -> None:
-    """Bake the thickness of MODEL, which is a file or a built-in mesh, into a texture map over its UVs.
+    """Bake the thickness of MODEL into a texture map over its UVs.
 
-    The values of the map are metres: 0.2 means 20 cm. A .glb output gets thicknessFactor and thicknessTexture. All
-    other content of a .glb or .gltf MODEL stays unchanged. The record of each output is written next to it, as
-    FILE.json. --out-dir bakes many models, skips finished models, and continues if one model fails.
+    MODEL is a file or a built-in mesh. The values of the map are metres: 0.2 means 20 cm. A .glb output is a copy
+    of MODEL with thicknessFactor and thicknessTexture. The record of each output is written next to it, as FILE.json.
+    --out-dir bakes many models, skips finished models, and continues if one model fails.
 
     --mode scatter bakes the light that leaves the body after scattering: --mode scatter --preset wax -o candle.exr
     """
@@ -214,7 +214,7 @@ def bake(models: tuple[str, ...], given: BakeOptions, as_json: bool) -> None:
     if other := [name for name in named if name in _SCATTER_ALONE]:
         raise InputError(
             _option(other[0]),
-            "this option does not apply to a bake of thickness",
+            "this option does not apply to thickness",
             f"add --mode {SCATTER}, or omit the option",
         )
     if given.usd is not None:
@@ -253,7 +253,7 @@ def bake(models: tuple[str, ...], given: BakeOptions, as_json: bool) -> None:
 
 
 def _named() -> list[str]:
-    """Parameters of the verb that are on the command line, and do not merely have a default."""
+    """Parameters that the user wrote on the command line."""
     context = click.get_current_context()
     return [name for name in context.params if context.get_parameter_source(name) == ParameterSource.COMMANDLINE]
 
@@ -316,7 +316,7 @@ def _read_fraction(name: str, text: str) -> float:
 
 
 def _read_length(name: str, text: str, unit: str) -> float | str:
-    """Length in metres, or a fraction as given, which depends on the mesh."""
+    """Length in metres, or a percentage as text."""
     from translucent.units import parse_length
 
     if text.strip().endswith("%"):
@@ -387,7 +387,7 @@ def _bake_one(job: Job, given: BakeOptions, as_json: bool) -> None:
         reported["import"] = recipe_for(given.program, largest)
         lines.append(reported["import"])
     if reported["unit"] == "m" and largest > RARELY_THICK:
-        text = f"{largest:.3g} m thick: is the unit right? Light passes little of that; for a figurine --height 12cm"
+        text = f"the model is {largest:.3g} m thick, too thick for most light: check --unit, or set --height 12cm"
         reported["advice"] = text
         lines.append(f"advice: {text}")
     if assumes_metres(job["model"], given.file):
@@ -481,7 +481,7 @@ def _lines(record: Record, reported: Record) -> Iterator[str]:
             f"{report['mean_standard_error']:.2g} on average, {report['max_standard_error']:.2g} at most{factor}{step}"
         )
     if reported["uv_file"]:
-        yield f"{reported['uv_file']}: the model with the UVs that were made for this map"
+        yield f"{reported['uv_file']}: the model with new UVs for this map"
     yield from (f"left out, {line}" for line in reported["left_out"])
 
 
@@ -494,7 +494,7 @@ def _check_report(
     checks: Mapping[str, Any], output: object, write: Callable[..., None], content: str
 ) -> dict[str, Any]:
     """Errors of what was baked, by mesh; their picture goes beside the output. None is a mesh that nothing shows."""
-    path, hidden = Path(f"{output}.check.png"), "it is hidden behind other parts of its body"
+    path, hidden = Path(f"{output}.check.png"), "the mesh is hidden by other parts of its body"
     write([one for one in checks.values() if one is not None], path)
     lines = [line for name, one in checks.items() for line in (f"check of {name!r}:", *str(one or hidden).split("\n"))]
     return {
@@ -524,13 +524,13 @@ def _bake_scatter(job: ScatterJob, given: BakeOptions, as_json: bool) -> None:
 def _scatter_lines(job: ScatterJob, record: dict[str, Any]) -> list[str]:
     parts = record.get("primitives") or [record]
     size = "x".join(map(str, record["size"])) + ", " if "size" in record else ""
-    found = [f"{job.output}: {size}scatter, nine coefficients for each channel"]
+    found = [f"{job.output}: {size}scattered light, nine coefficients per channel"]
     for part in parts:
         mean = ", ".join(f"{value:.3g}" for value in part["mean_in_uniform_light"])
-        found.append(f"{part['mesh']['name']}: {part['cells']} cells; {mean} of uniform light leave it on average")
+        found.append(f"{part['mesh']['name']}: {part['cells']} cells; on average, {mean} of uniform light leaves it")
         found += part["warnings"]
     if "uv_file" in record:
-        found.append(f"{job.output.with_name(record['uv_file']['file'])}: the model with the UVs made for this map")
+        found.append(f"{job.output.with_name(record['uv_file']['file'])}: the model with new UVs for this map")
     return found + [f"left out, {line}" for line in record.get("left_out", [])]
 
 
@@ -539,7 +539,7 @@ def _bake_many(models: tuple[str, ...], out_dir: Path, given: BakeOptions, as_js
     from translucent.files.paths import made_folder
 
     if given.jobs is not None and given.dask is not None:
-        do = "its workers are as many as they are; leave one out"
+        do = "omit --jobs or --dask"
         raise InputError(f"--jobs {given.jobs}", "--dask already chooses the workers", do)
     if given.dask is not None and given.resume:
         raise InputError(
@@ -596,13 +596,13 @@ def _executor(address: str | None) -> Iterator[Executor | None]:
     if address is None:
         yield None
         return
-    distributed = require_package("distributed", f"--dask {address}", "leave it out to bake on this machine")
+    distributed = require_package("distributed", f"--dask {address}", "omit --dask to bake on this machine")
     try:
         # A client that cannot connect leaves its loop running, with nothing to close it by.
         asyncio.run(_knock(distributed, address))
         client = distributed.Client(address, timeout=CONNECT_SECONDS)
     except (OSError, ValueError) as error:
-        found = f"no scheduler answers ({error or type(error).__name__})"
+        found = f"no scheduler answered ({error or type(error).__name__})"
         raise RenderError(f"--dask {address}", found, "check the address") from error
     with client:
         yield client.get_executor()
@@ -640,13 +640,13 @@ class LithophaneOptions:
 @click.argument("picture", type=click.Path(path_type=Path))
 @takes(LithophaneOptions)
 def lithophane(picture: Path, given: LithophaneOptions, as_json: bool) -> None:
-    """Make a plate for 3D printing that shows PICTURE in front of a light: thin where PICTURE is bright, thick where it
-    is dark.
+    """Make a plate for 3D printing that shows PICTURE.
 
-    The thickest part of the plate shows black, the thinnest part shows white, and the luminance in between is
-    proportional to PICTURE. The command then renders the plate in front of a uniform white light, and prints the
-    difference from PICTURE. The command assumes that light passes straight through the plate, so give the filament's
-    --td, or a --color that you saw in front of a light at a --distance.
+    In front of a light, thin parts of the plate appear bright, and thick parts appear dark. The thickest part of
+    the plate shows black, the thinnest part shows white, and the luminance in between is proportional to PICTURE.
+    The command then renders the plate in front of a uniform white light, and prints the difference from PICTURE.
+    The command assumes that light passes straight through the plate, so give the filament's --td, or a --color that
+    you saw in front of a light at a --distance.
     """
     from translucent.bake.lithophane import check_lithophane_output, lithophane
     from translucent.media.filament import medium_of_td
@@ -660,7 +660,7 @@ def lithophane(picture: Path, given: LithophaneOptions, as_json: bool) -> None:
         )
     medium = given.medium.read(shows_scattering=True)
     if (medium is None) == (td is None):
-        found = "no medium" if td is None else "--color or --preset is given, too"
+        found = "no medium is given" if td is None else "--td and a medium are both given"
         raise InputError(
             "lithophane", found, "choose the material with --td, with --color and --distance, or with --preset"
         )
@@ -691,7 +691,7 @@ def lithophane(picture: Path, given: LithophaneOptions, as_json: bool) -> None:
         echo(json.dumps(reported))
         return
     echo(f"{output}: {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} mm, {len(made.mesh.faces)} triangles")
-    echo(f"contrast {made.contrast:.3g} : 1; black is shown as {100 / made.contrast:.3g} % of white")
-    echo(f"rendered before an even white light: {100 * made.rms:.2g} % of white (rms) from what is asked for")
+    echo(f"contrast {made.contrast:.3g} : 1; black appears as {100 / made.contrast:.3g} % of white")
+    echo(f"in front of a uniform white light: rms difference from the picture {100 * made.rms:.2g} % of white")
     if given.check:
-        echo(f"{picture_file}: asked for, shown")
+        echo(f"{picture_file}: requested picture, rendered plate")

@@ -24,7 +24,7 @@ _FOLDER = click.Path(path_type=Path)
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 _DEBUG = click.option("--debug", is_flag=True, hidden=True)
 _ONLY = click.option(
-    "--only", metavar="SCENE,...", help="Run only these scenes, or groups of scenes such as scattering."
+    "--only", metavar="SCENE,...", help="Use only these scenes, or groups of scenes such as scattering."
 )
 
 
@@ -32,23 +32,14 @@ _ONLY = click.option(
     epilog="Example: translucent benchmark list",
 )
 def benchmark() -> None:
-    """Score any renderer on thirty scenes with translucent objects, whose true pictures are known.
-
-    \b
-    list     scenes, and renderers that can run on this machine
-    export   write the scenes as glTF, JSON and EXR files
-    run      render the scenes by an installed renderer, and score its pictures
-    score    score pictures that you rendered
-    page     one self-contained page of results
-    merge    join results of several renderers or machines
-    """
+    """Score renderers on thirty scenes with known true pictures."""
 
 
 @benchmark.command("list", epilog="Example: translucent benchmark list")
 @_JSON
 @_DEBUG
 def list_scenes(as_json: bool, debug: bool) -> None:
-    """List the scenes, the purpose of each scene, and the renderers that can run on this machine."""
+    """List the scenes and their purposes, and available renderers."""
     from translucent.benchmark.adapters import adapters
     from translucent.benchmark.scenes import SCENES
     from translucent.benchmark.truth import read_records
@@ -77,12 +68,12 @@ def list_scenes(as_json: bool, debug: bool) -> None:
 @_ONLY
 @_DEBUG
 def export(folder: Path, only: str | None, debug: bool) -> None:
-    """Write the scenes into FOLDER: scene.glb, scene.json and environment.exr for each, and a README."""
+    """Write the scenes into FOLDER as glTF, JSON and EXR files."""
     from translucent.benchmark.export import export_scenes
 
     require_package("OpenEXR", "benchmark export")
     found = export_scenes(folder, _chosen(only))
-    echo(f"{len(found)} scenes in {folder}; what to do with them is in {folder / 'README.txt'}")
+    echo(f"{len(found)} scenes in {folder}; {folder / 'README.txt'} explains them")
 
 
 @benchmark.command(epilog="Example: translucent benchmark run ours mitsuba-64 -o results")
@@ -99,7 +90,7 @@ def export(folder: Path, only: str | None, debug: bool) -> None:
 @_JSON
 @_DEBUG
 def run(names: tuple[str, ...], output: Path, only: str | None, as_json: bool, debug: bool) -> None:
-    """Render the scenes with renderers that are installed on this machine, and score the pictures.
+    """Render the scenes with installed renderers, and score them.
 
     The results of each renderer are written to DIR/ADAPTER/, and packed into DIR/ADAPTER.zip, which you can send to
     others. The adapter name `all` selects all installed renderers.
@@ -156,7 +147,9 @@ def score(
     as_json: bool,
     debug: bool,
 ) -> None:
-    """Score the pictures SCENE.exr or SCENE.npy in FOLDER. The pictures hold linear radiance at the size of the scene.
+    """Score your pictures of the scenes in FOLDER.
+
+    FOLDER contains SCENE.exr or SCENE.npy for each scene, with linear radiance at the size of the scene.
 
     The scores are written to FOLDER/results.json, and packed into FOLDER.zip, which you can send to others. Scenes
     without a picture are not counted.
@@ -212,7 +205,7 @@ def score(
 )
 @_DEBUG
 def page(places: tuple[Path, ...], output: Path, debug: bool) -> None:
-    """Write one self-contained HTML page about results, which are folders or .zip files."""
+    """Write one HTML page about results (folders or .zip files)."""
     from translucent.benchmark.page import write_benchmark_page
     from translucent.benchmark.results import read_results, result_folders, scored
 
@@ -238,7 +231,7 @@ def page(places: tuple[Path, ...], output: Path, debug: bool) -> None:
 @_JSON
 @_DEBUG
 def merge(places: tuple[Path, ...], output: Path, as_json: bool, debug: bool) -> None:
-    """Join the results of several renderers or machines, which are folders or .zip files. Scores are computed anew."""
+    """Join results (folders or .zip files), and score them again."""
     from translucent.benchmark.results import merge as merged
 
     with tempfile.TemporaryDirectory(prefix="translucent-benchmark-") as temporary:
@@ -247,7 +240,7 @@ def merge(places: tuple[Path, ...], output: Path, as_json: bool, debug: bool) ->
         echo(json.dumps([_summary(one) for one in made]))
         return
     for one in made:
-        echo(f"{one.folder}: {one.name} {one.version}, {len(one.scenes)} scenes, {one.machine or 'no machine stated'}")
+        echo(f"{one.folder}: {one.name} {one.version}, {len(one.scenes)} scenes, {one.machine or 'machine not stated'}")
 
 
 def _say(renderer: str, scene: str) -> None:

@@ -45,7 +45,7 @@ def echo(text: str, *, err: bool = False, nl: bool = True, color: bool | None = 
             return
         if err:
             raise
-        found = f"it cannot be written ({error.strerror})"
+        found = f"the output cannot be written ({error.strerror})"
         raise RenderError("standard output", found, "check the disk, and the target of the redirection") from error
 
 

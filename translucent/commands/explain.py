@@ -57,7 +57,9 @@ class ExplainOptions:
 @models_argument()
 @takes(ExplainOptions)
 def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
-    """Print facts about MODEL, and the plan: the passes that would render MODEL, each with its reason.
+    """Print facts about MODEL, and the plan to render MODEL.
+
+    The plan lists the passes of the renderer, each with its reason, and the approximations.
 
     A .glb or .gltf file keeps its camera, lights and media. Several models, each with its material: goblet:crystal
     wine:red_wine.
@@ -86,7 +88,7 @@ def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
     else:
         _echo_mesh(scene.objects[0].mesh)
     if chosen is None:
-        echo("plan: none, since no object is translucent; see with --preset NAME, or --color C and --distance D")
+        echo("plan: none, because no object is translucent; add --preset NAME, or --color C and --distance D")
     else:
         echo(f"plan: {chosen}")
         echo(str(_traffic(scene, chosen)))
@@ -95,15 +97,15 @@ def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
 def _sentence(model: str, scene: Scene, chosen: RenderPlan | None) -> str:
     """Answer in one sentence: whether and how the picture is made."""
     if chosen is None:
-        return f"{Path(model).name} is opaque: name a medium, and light passes it."
+        return f"{Path(model).name} is opaque. To make it translucent, give it a medium."
     count = len(scene.bodies)
     what = f"{count} bod{'y' if count == 1 else 'ies'}"
     how = [
-        "refracted and mirrored light" if chosen.interfaces is not None else "light that goes straight on",
-        *(["light that is scattered many times"] if chosen.multiple_scattering else []),
+        "refracted and reflected light" if chosen.interfaces is not None else "straight rays",
+        *(["multiple scattering"] if chosen.multiple_scattering else []),
         *(["random paths"] if chosen.paths is not None else []),
     ]
-    exact = "is exact" if chosen.exact else "is not exact everywhere, as the limits below say"
+    exact = "is exact" if chosen.exact else "is not exact everywhere (see the limits below)"
     return (
         f"{Path(model).name} shows {what}, {tall(scene.shown_bounds)}, with {' and '.join(how)}, "
         f"in {len(chosen.passes)} passes; its thickness {exact}."
@@ -175,7 +177,7 @@ def _traffic(scene: Scene, chosen: RenderPlan) -> FrameTraffic:
 @click.command(epilog="Example: translucent doctor")
 @common_options
 def doctor(as_json: bool) -> None:
-    """Print facts about this machine: its OpenGL, its packages, and the use of each missing package."""
+    """Print facts about this machine: OpenGL and packages."""
     from translucent import doctor as examination
 
     facts = examination.examine()

@@ -133,8 +133,8 @@ class ExtinctionOptions:
 def extinction(
     context: click.Context, color: str | None, distance: str | None, given: ExtinctionOptions, as_json: bool
 ) -> None:
-    """Compute the extinction of a medium that turns white light into COLOR after DISTANCE: sigma_t = -log(color) /
-    distance.
+    """Compute the extinction of a medium from its color. The medium turns white light into COLOR after DISTANCE:
+    sigma_t = -log(color) / distance.
 
     COLOR is '#7b1e3a', 7b1e3a, teal, 'srgb(.5,.1,.2)', 'linear(.2,.6,.3)' or a pixel of an image, photo.png@120,45.
 
@@ -175,7 +175,7 @@ def extinction(
     if frame is not None:
         reported["on"] = {"model": given.model, **appearance_of(frame, medium).summary()}
         reported["warnings"] += [
-            f"the average {name} is made by the edges: {fraction:.0%} of it comes from the thinnest 5 % of the pixels"
+            f"{fraction:.0%} of the average {name} comes from the thinnest 5 % of the pixels, at the edges"
             for name, fraction in zip(("red", "green", "blue"), reported["on"]["thin_share"], strict=True)
             if fraction > MOST_THIN_SHARE
         ]
@@ -183,12 +183,12 @@ def extinction(
         stated = stated if distance is not None else reported["on"]["mean_thickness"]
     named = given.source is not None or given.preset is not None
     if given.ior is None and not named and given.target not in (None, *_WITHOUT_SURFACE):
-        echo("note: its index of refraction is 1, which mirrors and bends nothing; for glass, --ior 1.5", err=True)
+        echo("note: its ior is 1, so its surface neither reflects nor refracts; for glass, add --ior 1.5", err=True)
     return _echo(reported, medium, stated, given, as_json)
 
 
 def _check_usage(given: ExtinctionOptions, color: str | None, as_json: bool) -> None:
-    """Raise `InputError` if options are given together that ask for different things, or lack what they are of."""
+    """Raise `InputError` if options contradict each other, or lack an option that they need."""
     batch, fits = {"--batch": given.batch}, {"--fit": given.fit or None}
     media = {"COLOR": color, "--preset": given.preset, "--from": given.source, "--td": given.td}
     for rivals in (
@@ -244,7 +244,7 @@ def _distance_hint(color: str) -> str:
     from translucent.media.presets import presets
 
     if color in presets():
-        return f"for the preset of this name write --preset {color}"
+        return f"{color} is a preset: write --preset {color}"
     return f"a color has a meaning only at a distance: translucent extinction '{color}' 1cm"
 
 
@@ -303,7 +303,7 @@ def _converted(
 
 
 def _fitted(given: ExtinctionOptions) -> tuple[Medium, float, dict[str, Any], str]:
-    """Medium fitted to what the options name, where its color is stated, facts about it, and a report of the fit."""
+    """Fitted medium, the distance of its color, facts about it, and a report of the fit."""
     fits, photographed = given.fit, given.white is not None or bool(given.patch)
     described = _is_table(fits) or fits[0].suffix.lower() == ".toml"
     if described and len(fits) > 1:
@@ -336,10 +336,12 @@ def _fitted_to_table(given: ExtinctionOptions) -> tuple[Medium, float, dict[str,
     fit = fit_wedge(given.fit[0], given.unit)
     distance = float(np.median(fit.distances))
     reported = summary(fit.medium.transmittance(distance), distance, fit.medium.extinction, given.unit_out)
-    reported["warnings"][:0] = [f"{name} brightens with distance; its extinction is 0" for name in fit.clipped]
+    reported["warnings"][:0] = [
+        f"{name} brightens with distance, so its extinction is set to 0" for name in fit.clipped
+    ]
     error = None if fit.standard_error is None else fit.standard_error.tolist()
     reported |= {"samples": len(fit.distances), "standard_error": error, "residuals": fit.residuals.tolist()}
-    known = "unknown with one sample" if fit.standard_error is None else f"{triple_text(fit.standard_error)} 1/m"
+    known = "unknown (a single sample)" if fit.standard_error is None else f"{triple_text(fit.standard_error)} 1/m"
     lines = [f"standard error  {known}", f"residuals of {len(fit.distances)} samples, log(color / fit):"]
     for metres, residual in zip(fit.distances, fit.residuals, strict=True):
         lines.append(f"at {metres:<12.4g} m {triple_text(residual)}")
@@ -362,7 +364,7 @@ def _fitted_to_photographs(given: ExtinctionOptions) -> tuple[Medium, float, dic
     else:
         if given.white is None or not given.patch:
             missing = "--white" if given.white is None else "--patch"
-            do = "say where in it the bare light is, --white X,Y,W,H, and the steps, --patch X,Y,W,H=1mm,2mm,4mm"
+            do = "give the rectangles of the bare light, --white X,Y,W,H, and of the steps, --patch X,Y,W,H=1mm,2mm,4mm"
             raise InputError(f"--fit {given.fit[0]}", f"this fit also needs {missing}", do)
         listed = [patch for text in given.patch for patch in parse_patches(text, given.unit)]
         shots = [Photograph(one, parse_rectangle(given.white), listed) for one in given.fit]
@@ -370,8 +372,8 @@ def _fitted_to_photographs(given: ExtinctionOptions) -> tuple[Medium, float, dic
     reported = summary(fit.medium.transmittance(fit.distance), fit.distance, fit.medium.extinction, given.unit_out)
     reported["warnings"][:0] = fit.warnings
     if fit.distance >= _THICK:
-        doubt = "lengths that name no unit are in metres, unless --unit mm is given"
-        reported["warnings"].insert(0, f"plates about {length_text(fit.distance)} thick: {doubt}")
+        doubt = "lengths without a unit are metres; for millimetres, add --unit mm"
+        reported["warnings"].insert(0, f"the samples are about {length_text(fit.distance)} thick: {doubt}")
     reported |= {
         "samples": fit.samples.tolist(),
         "standard_error": fit.standard_error.tolist(),
@@ -381,9 +383,9 @@ def _fitted_to_photographs(given: ExtinctionOptions) -> tuple[Medium, float, dic
     }
     samples = ", ".join(str(count) for count in fit.samples)
     report = [
-        f"error bars      {triple_text(fit.interval)} 1/m to either side hold the extinction with 95 %",
-        f"lost at faces   {triple_text(100 * fit.surface_loss)} %",
-        f"scatter         {triple_text(fit.chi2_per_degree)} chi2 per degree of freedom, 1 where it is noise alone",
+        f"error bars      {triple_text(fit.interval)} 1/m (95 % confidence interval of the extinction)",
+        f"reflected       {triple_text(100 * fit.surface_loss)} % is lost by reflection at the faces",
+        f"scatter         {triple_text(fit.chi2_per_degree)} chi2 per degree of freedom (1 for noise alone)",
         f"from            {samples} patches in {len(shots)} photograph{'s' if len(shots) > 1 else ''}",
     ]
     return fit.medium, fit.distance, reported, "\n".join(report)
@@ -428,8 +430,8 @@ def _report(reported: dict[str, Any]) -> str:
     lines += [
         f"mean free path  {triple_text(_infinite(reported['mean_free_path']))} m",
         f"half-value      {triple_text(_infinite(reported['half_value_thickness']))} m",
-        f"                light has the color at {distance:g} m, 1/e (37 %) at a mean free path, half at a half-value",
-        f"filament TD     {reached}: where {100.0 * td['transmittance']:g} % of the luminance of white light is left",
+        f"                light has this color after {distance:g} m; a mean free path leaves 37 %, a half-value half",
+        f"filament TD     {reached}: where {100.0 * td['transmittance']:g} % of the luminance of white light passes",
     ]
     if takes_colors(sys.stdout):
         if "on" in reported:
@@ -449,7 +451,7 @@ def _appearance_lines(reported: dict[str, Any]) -> list[str]:
     ]
     for part in reported["parts"]:
         color = f"{triple_text(part['color'])} linear, {part['hex']}"
-        lines.append(f"at {part['thickness']:<9.4g} m  {color}; {part['thinner']:.0%} of it is thinner")
+        lines.append(f"at {part['thickness']:<9.4g} m  {color}; {part['thinner']:.0%} of the model is thinner")
     return lines
 
 
@@ -471,8 +473,8 @@ def _convert_table(table: Path, given: ExtinctionOptions) -> None:
     else:
         done.write(output)
     if done.clamped:
-        reported = f"{done.clamped} of {len(done.records)} colors clamped to {CLAMP:g} where they were below"
-        echo(f"warning: {reported}; their warnings say so", err=True)
+        reported = f"{done.clamped} of {len(done.records)} colors had channels below {CLAMP:g}, now {CLAMP:g}"
+        echo(f"warning: {reported}; see the warnings of these rows", err=True)
     for line in done.errors:
         echo(f"error: {line}", err=True)
     if done.errors:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @click.group(epilog="Example: translucent material show model.glb")
 def material() -> None:
-    """Show, replace or check the transmissive materials of a glTF file."""
+    """Show, replace or check the materials of a glTF file."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class ShowOptions:
 @click.argument("model")
 @takes(ShowOptions)
 def show(model: str, given: ShowOptions, as_json: bool) -> None:
-    """List the materials of MODEL, a .glb or .gltf file, with the volume of each material."""
+    """List the materials of a .glb or .gltf MODEL with their volumes."""
     from translucent.gltf.materials import read_materials
 
     found = read_materials(model, draft_extensions=given.file.draft_extensions)
@@ -75,7 +75,7 @@ def _describe(entry: GltfMaterial) -> None:
     if entry.clearcoat:
         echo(f"  clearcoat   {entry.clearcoat:10.5g}, roughness {entry.clearcoat_roughness:g}")
     if any(entry.emissive):
-        echo(f"  emissive    {triple_text(entry.emissive)} linear, of the surface")
+        echo(f"  emissive    {triple_text(entry.emissive)} linear, emitted by the surface")
     for warning in entry.warnings:
         echo(f"  warning: {warning}")
 
@@ -169,7 +169,9 @@ class CheckOptions:
 @click.argument("model")
 @takes(CheckOptions)
 def check(model: str, given: CheckOptions, as_json: bool) -> None:
-    """Check the thickness and attenuation in MODEL, a .glb or .gltf file, against the thickness of its meshes.
+    """Check the thickness and attenuation in MODEL, a glTF file.
+
+    The command compares the materials with the thickness of the meshes.
 
     The command prints errors, warnings and notes, each with a solution. For each body, the true color of the light that
     passes is printed next to the colors that known viewers show. The exit code is 1 if MODEL has an error (with --fix:
@@ -205,7 +207,7 @@ def check(model: str, given: CheckOptions, as_json: bool) -> None:
 def _echo(model: str, found: MaterialCheck) -> None:
     counts = found.summary()["counts"]
     reported = ", ".join(f"{n} {name}{'' if n == 1 else 's'}" for name, n in counts.items())
-    echo(f"{model}: {len(found.bodies)} bod{'y' if len(found.bodies) == 1 else 'ies'} that light passes; {reported}")
+    echo(f"{model}: {len(found.bodies)} translucent bod{'y' if len(found.bodies) == 1 else 'ies'}; {reported}")
     for one in found.findings:
         echo(f"{one.severity:8}{one.code}: {one.where}")
         echo(f"        {one.text}")
@@ -231,4 +233,4 @@ def _echo_body(body: dict[str, Any]) -> None:
     ]
     echo(f"        thickness {', '.join(lengths)}")
     colors = [f"{name} {to_hex(color)}" for name, color in body["colors"].items()]
-    echo(f"        passes, mean over views: {', '.join(colors)}")
+    echo(f"        transmitted color, mean over all views: {', '.join(colors)}")

@@ -136,7 +136,7 @@ def files_of(model: str) -> list[str]:
 
 
 def read_scene(model: str, requested: SceneRequest) -> Scene:
-    """The scene of a glTF file, or one mesh on show, as it is requested."""
+    """Requested scene of a glTF file or of a mesh."""
     from translucent.scene.showcase import framing, objects_named, with_media, with_pattern, with_roughness
     from translucent.scene.stages import staged, upright
     from translucent.scene_files import is_composed
@@ -194,7 +194,7 @@ def _patterns(scene: Scene, requested: SceneRequest) -> list[tuple[str, Sequence
 
 
 def _textured_roughness(scene: Scene, requested: SceneRequest) -> list[str]:
-    """Note on what wins over the roughness of a preset, or of an option: the texture of a file, times that."""
+    """Note that a roughness texture of the file multiplies the requested roughness."""
     from translucent.scene.scene import object_names
 
     values = {requested.roughness, *(one.roughness for one in requested.media)} - {None, 1.0}
@@ -209,8 +209,8 @@ def _textured_roughness(scene: Scene, requested: SceneRequest) -> list[str]:
     factors = " or ".join(
         f"{value:g}" for value in sorted({item.surface.roughness for item in textured if item.surface})
     )
-    names = f"{object_names(textured)}: roughness is the file's texture"
-    return [f"{names} times {factors}, which is requested; --roughness 1 shows the texture alone"] if textured else []
+    names = f"{object_names(textured)}: the roughness is the texture of the file"
+    return [f"{names} times the requested {factors}; --roughness 1 uses the texture unchanged"] if textured else []
 
 
 def _turned(stage: str | None) -> tuple[str | None, float]:
@@ -379,7 +379,7 @@ def mesh_file(model: str, unit: str | None) -> str:
 
 
 def _defined_camera(scene: Scene, options: CameraOptions, size: tuple[int, int], stage: Stage | None) -> Camera:
-    """Camera that the options define, or that frames all objects as they say; on a stage, that is for later."""
+    """Camera that the options define, or that frames all objects; the camera of a stage is made later."""
     from translucent.scene.camera import Camera
     from translucent.scene.showcase import framing
 
@@ -413,13 +413,13 @@ def assumes_metres(model: str, file: FileOptions) -> bool:
 
 
 def size_text(scene: Scene) -> str:
-    """Size of what a scene shows; where its file names no unit, with what sets another."""
+    """Size of the visible scene, with the option that changes its unit if the file has none."""
     notes = [note for item in scene.shown if (note := size_note(item.mesh))]
     return notes[0] if notes else tall(scene.shown_bounds)
 
 
 def echo_advice(scene: Scene, remarks: Sequence[str]) -> None:
-    """Print how large a scene is, and what would show it better."""
+    """Print the size of a scene, and advice for a better picture."""
     echo(f"size: {size_text(scene)}")
     for remark in remarks:
         echo(f"advice: {remark}")
@@ -447,7 +447,7 @@ def medium_lines(scene: Scene, reach: Callable[[Object], float] | None = None) -
         names = ", ".join(sorted({repr(body.mesh.name) for body in bodies}))
         whose, first = f"{names}: " if len(users) > 1 else "", bodies[0]
         if (sheet := first.sheet_thickness) is not None:
-            lines.append(f"{whose}thin, white light is {to_hex(medium.transmittance(sheet))} behind it")
+            lines.append(f"{whose}thin-walled: white light is {to_hex(medium.transmittance(sheet))} behind it")
             continue
         length = reach(first) if reach is not None else 0.1 * float(np.linalg.norm(first.bounds[1] - first.bounds[0]))
         sigma = ", ".join(f"{value:.4g}" for value in medium.extinction)
@@ -491,7 +491,7 @@ def read_objects(names: Sequence[str]) -> list[NamedMedium]:
             raise InputError(f"{_OBJECT} {name!r}", "the object is named twice", "give the object one medium")
         given = collected(_ObjectOptions, _of_one_object.make_context("render", options).params)
         if (medium := given.read()) is None:
-            do = "add --preset NAME, or --color C and --distance D, behind it"
+            do = "after the name, add --preset NAME, or --color C and --distance D"
             raise InputError(f"{_OBJECT} {name!r}", "no medium is given for this object", do)
         found.append(
             NamedMedium(

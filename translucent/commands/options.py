@@ -81,7 +81,7 @@ def option(default: Any = None, *, names: tuple[str, ...] = (), help: str | Call
 
 
 def group(kind: type, without: Collection[str] = ()) -> Any:
-    """Field of a group of options that is another group, without the options of these names."""
+    """Field that includes another group of options, without the options of these names."""
     return dataclasses.field(default_factory=kind, metadata={"group": kind, "without": without})
 
 
@@ -212,7 +212,7 @@ class _LateOption(click.Option):
 
 
 class NamesOf(click.Choice):  # type: ignore[type-arg] # click below 8.4 has no parameters
-    """Choice among the names in a table, which is imported only where they are looked at.
+    """Choice among the names in a table, which is imported late.
 
     Parameters
     ----------
@@ -231,14 +231,14 @@ class NamesOf(click.Choice):  # type: ignore[type-arg] # click below 8.4 has no 
 
 
 def clamp_option() -> Any:
-    """Field for colors with a channel of 0, which no finite extinction makes."""
+    """Option that replaces color channels of 0, which would need an infinite extinction."""
     reported = "Replace color channels below 1e-4 by 1e-4, with a warning; or refuse channels of 0. Default: --clamp."
     return option(names=("--clamp/--no-clamp",), help=reported)
 
 
 @dataclass(frozen=True, kw_only=True)
 class MediumOptions:
-    """Options that choose a medium by what it transmits."""
+    """Options that choose a medium by its transmitted color, or by name."""
 
     color: str | None = option(
         metavar="C", help="Color that the medium transmits: '#7b1e3a', salmon, 'linear(.18,.62,.35)'."
@@ -248,7 +248,7 @@ class MediumOptions:
     clamp: bool | None = clamp_option()
 
     def read(self, *, shows_scattering: bool = False) -> Medium | None:
-        """Medium that is chosen, if any; warns of presets that live by scattered light where that is not shown."""
+        """Chosen medium, if any; warns if a preset needs scattered light and the verb does not render it."""
         from translucent.media.medium import Medium
         from translucent.media.presets import preset
         from translucent.units import parse_length
@@ -269,7 +269,7 @@ class MediumOptions:
             return None
         metres = parse_length(distance)
         if metres >= 1.0 and not distance.strip()[-1:].isalpha():
-            advise(f"--distance {distance} is {metres:g} m; lengths have a unit, as {distance}cm")
+            advise(f"--distance {distance} means {metres:g} m; to use another unit, write for example {distance}cm")
         applied, warnings = clamped(color) if self.clamp is not False else (color, [])
         medium = Medium.from_color(applied, metres)
         for line in warnings:
@@ -292,7 +292,7 @@ class MediumOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class AnyMediumOptions(MediumOptions):
-    """Options that choose a medium by what it transmits, or by the color that it has where it is thick."""
+    """Options that choose a medium by its transmitted color, by its scattering color, or by name."""
 
     scattering_color: str | None = option(
         metavar="C",
@@ -326,10 +326,10 @@ class AnyMediumOptions(MediumOptions):
             raise InputError(
                 given,
                 f"{other[0]} is given, too, and both options define a medium",
-                "give a single medium: either by its transmitted color or by its scattering color",
+                "give only one of the two",
             )
         if color is None or length is None:
-            do = "give both: the color of a body with no end says nothing about how far light gets in it"
+            do = "give both: the color alone does not determine how far light goes into the body"
             raise InputError(given, f"{missing} is missing", do)
         return scattering_medium(color, parse_length(length), ior=SCATTERING_IOR)
 
@@ -355,15 +355,15 @@ class BodyOptions(AnyMediumOptions):
     )
 
     def read(self, *, shows_scattering: bool = True) -> Medium | None:
-        """Medium that is chosen, if any, undiluted; a color at a distance is that of a solid."""
+        """Chosen medium, if any, before dilution."""
         from translucent.scene.showcase import SOLID_IOR
 
         medium = super().read(shows_scattering=shows_scattering)
         if medium is None:
             return None
         if self.color is not None and not medium.extinction.any():
-            do = "for white wax or milk: --preset wax, or --scattering-color white --mean-free-path 2mm"
-            advise(f"--color {self.color} takes no light away, so that it is clear glass; {do}")
+            do = "for white wax or milk, use --preset wax, or --scattering-color white --mean-free-path 2mm"
+            advise(f"--color {self.color} absorbs no light, so the medium looks like clear glass; {do}")
         ior = self.ior or (SOLID_IOR if self.color is not None else medium.ior)
         return medium if ior == medium.ior else dataclasses.replace(medium, ior=ior)
 
@@ -379,7 +379,7 @@ class BodyOptions(AnyMediumOptions):
 
     @property
     def keeps_ior(self) -> bool:
-        """True if objects whose file states an index of refraction keep it: of a color alone, none is known."""
+        """True if objects keep the index of refraction of their file, because the options only state a color."""
         return self.color is not None and self.ior is None
 
 
@@ -390,11 +390,11 @@ def clamped(color: str) -> tuple[npt.ArrayLike, list[str]]:
 
     triple, changed = clamp_colors(parse_color(color))
     # As it was written, if nothing is to be done: errors repeat it.
-    return (triple, [f"color clamped to {CLAMP:g} where it was below"]) if changed.any() else (color, [])
+    return (triple, [f"channels of the color below {CLAMP:g} were set to {CLAMP:g}"]) if changed.any() else (color, [])
 
 
 def outside_option() -> Any:
-    """Field for reading what a model links to."""
+    """Option to read files outside the folder of a model."""
     return option(
         False,
         help=(
@@ -491,20 +491,20 @@ class CameraOptions:
                 f"--orbit {self.orbit!r}", "the value is not two numbers", "write for example --orbit 30,15"
             ) from None
         if not (abs(yaw) <= 1e6 and abs(pitch) < 90.0):
-            found = "a pitch beyond -90 to 90" if abs(yaw) <= 1e6 else "not finite"
+            found = "the pitch must lie between -90 and 90" if abs(yaw) <= 1e6 else "the yaw is too large"
             raise InputError(f"--orbit {self.orbit}", found, "give degrees, such as 30,15")
         return -direction_from(yaw, pitch)
 
     @property
     def defining(self) -> list[str]:
-        """The options among these that define a camera, rather than choose one of the file."""
+        """Names of the given options that define a new camera."""
         options = {"--eye": self.eye, "--target": self.target, "--up": self.up, "--fov": self.fov}
         options |= {"--orbit": self.orbit, "--fit": self.fit}
         return [name for name, value in options.items() if value is not None]
 
 
 def stage_option() -> Any:
-    """Field for what the model stands on and before."""
+    """Option for the stage: ground, backdrop and lights."""
 
     def words() -> str:
         from translucent.scene.stages import DEFAULT_STAGE, STAGES
@@ -519,22 +519,23 @@ def stage_option() -> Any:
 
 
 def ground_option() -> Any:
-    """Field for the color of what a stage's model stands on."""
+    """Option for the color of the stage's ground."""
     words = (
-        "Color of the stage's ground; none: no ground. For shadows without a ground: --transparent. Default: by stage."
+        "Color of the stage's ground; none: no ground. For shadows without a ground: --transparent. Default: the "
+        "color of the stage."
     )
     return option(metavar="C", help=words)
 
 
 def roughness_option() -> Any:
-    """Field for the surfaces of media."""
-    reported = "Roughness of the surfaces of media, 0 (polished) to 1. Default: that of the preset, of the file, or 0."
+    """Option for the roughness of surfaces of media."""
+    reported = "Roughness of the surfaces of media, 0 (polished) to 1. Default: as the preset or the file says, or 0."
     return option(type=click.FloatRange(0.0, 1.0), metavar="R", help=reported)
 
 
 @dataclass(frozen=True, kw_only=True)
 class LookOptions:
-    """Options for what lights the model, what is seen behind it, how bright the picture is, and its surfaces."""
+    """Options for environment, stage, background, exposure and roughness."""
 
     environment: str | None = option(
         metavar="E",
@@ -595,9 +596,8 @@ def _method_words() -> str:
     *names, last = METHODS
     sheets = " and ".join(name for name, method in METHODS.items() if method.makes_sheets)
     return (
-        f"{', '.join(names)} or {last}. Default: the planner's choice. Without OpenGL, a method that finds all "
-        f"surfaces "
-        f"on each ray replaces all but {sheets}."
+        f"{', '.join(names)} or {last}. Default: the planner's choice. Without OpenGL, the CPU finds all surfaces "
+        f"on each ray, whatever the method, except for {sheets}."
     )
 
 
@@ -689,7 +689,7 @@ class ChoiceOptions:
     flags: Flags = group(Flags)
 
     def read(self) -> RenderRequest:
-        """Request for a picture; None of each choice that no option makes."""
+        """Rendering request from the options; None for each choice that is left to the planner."""
         from translucent.planning.caustics import Caustics
         from translucent.planning.request import RenderRequest
         from translucent.planning.shadow_maps import ShadowMaps
@@ -767,14 +767,14 @@ def triple_text(values: Any) -> str:
 
 
 def verbose_option() -> Any:
-    """Field for saying how a picture was made."""
+    """Option to print the media and the plan of a picture."""
     return option(
         False, names=("-v", "--verbose"), help="Also print the media of the scene, and the plan with its reasons."
     )
 
 
 def overwrite_option() -> Any:
-    """Field of verbs that read files and write one, which `refuse_overwriting` looks at."""
+    """Option that allows a verb to overwrite an input file; see `refuse_overwriting`."""
 
     def note(context: click.Context, _: click.Parameter, given: bool) -> bool:
         context.meta[_OVERWRITE] = given

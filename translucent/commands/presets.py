@@ -30,7 +30,7 @@ _LISTED = ("name", "kind", "group", "regime", "colors", "diffuse_color", "source
 @common_options
 @click.pass_context
 def presets(context: click.Context, group: str | None, search: str | None, as_json: bool) -> None:
-    """List the named media, with their effect on light and their colors.
+    """List the named media with their colors.
 
     The first three colors are the colors of white light after 1 mm, 1 cm and 10 cm in the medium. The fourth color, for
     media that scatter, is the color of a thick slab in white light. Terminals with colors also show slabs of 1, 5 and
@@ -77,7 +77,7 @@ def _listed(group: str | None, search: str | None) -> list[Preset]:
 @common_options
 @click.pass_context
 def show(context: click.Context, name: str, as_json: bool) -> None:
-    """Print everything about the medium NAME: coefficients, colors, source, and the colors by absorption alone."""
+    """Print the coefficients, colors and source of a named medium."""
     from translucent.media.presets import preset
 
     one = preset(name)

@@ -187,10 +187,11 @@ class RenderOptions:
 @models_argument()
 @takes(RenderOptions)
 def render(model: str, given: RenderOptions, as_json: bool) -> None:
-    """Render a picture of MODEL, which is a file or a built-in mesh.
+    """Render a picture of MODEL.
 
-    By default, the model stands on a ground that shows its shadow; see --stage. A .glb or .gltf file keeps its camera,
-    lights and media; --color, --preset or --scattering-color replaces the media. All other files hold one mesh.
+    MODEL is a file or a built-in mesh. By default, the model stands on a ground that shows its shadow; see --stage.
+    A .glb or .gltf file keeps its camera, lights and media; --color, --preset or --scattering-color replaces the
+    media. All other files hold one mesh.
 
     Several models, each with its material: translucent render goblet:crystal wine:red_wine -o wine.png
 
@@ -302,8 +303,8 @@ def _check_together(given: RenderOptions, request: RenderRequest, pictures: Pict
             "--denoise": given.denoise or None,
         }
         if wrong := [name for name, value in chosen.items() if value is not None]:
-            found = f"--as {given.system}: paths of another renderer choose nothing of that kind"
-            raise InputError(wrong[0], found, "these two options exclude each other: omit one of them")
+            found = f"--as {given.system} writes a scene for another renderer, which ignores this option"
+            raise InputError(wrong[0], found, "omit one of the two options")
         return
     if given.transparent and given.opaque_with is None and given.output.suffix.lower() == ".mp4":
         found = "a film format cannot store a transparent background"
@@ -312,19 +313,19 @@ def _check_together(given: RenderOptions, request: RenderRequest, pictures: Pict
         return
     interfaces = request.interfaces
     clashes = {
-        "--transparent": (given.transparent, "which draws the background"),
-        "--denoise": (given.denoise, "which combines two pictures"),
+        "--transparent": (given.transparent, "it draws the background"),
+        "--denoise": (given.denoise, "the picture then comes from two renderers"),
         f"--interfaces {interfaces and interfaces.name}": (
             interfaces is not None and not interfaces.finds_exits,
-            "which finds interfaces in screen space",
+            "it needs interfaces in screen space",
         ),
-        f"--stage {given.stage}": (given.stage not in (None, NO_STAGE), "which draws no shadows of a stage"),
-        "--caustics": (request.caustics is not None, "which draws what light lands on"),
-        f"--size {given.size}": (pictures.tiled, "which draws all of it at once"),
+        f"--stage {given.stage}": (given.stage not in (None, NO_STAGE), "it draws no shadows of the stage"),
+        "--caustics": (request.caustics is not None, "it draws the objects that caustics would illuminate"),
+        f"--size {given.size}": (pictures.tiled, "it cannot draw such a large picture"),
     }
     for requested, (clash, why) in clashes.items():
         if clash:
-            raise InputError(requested, f"--opaque-with, {why}", f"omit --opaque-with, or omit {requested}")
+            raise InputError(requested, f"not possible with --opaque-with: {why}", f"omit {requested} or --opaque-with")
 
 
 class Pictures:
@@ -355,10 +356,10 @@ class Pictures:
         check_exposure(self.exposure)
         self._check_size()
         if self.denoise and self.tiled:
-            found = f"{self.size[0]}x{self.size[1]} pixels, which are written in tiles: seams would show"
+            found = f"{self.size[0]}x{self.size[1]} pixels are rendered in tiles, and the denoiser would show seams"
             raise InputError("--denoise", found, "choose a smaller picture size, or omit --denoise")
         if self.aov is not None and self.tiled:
-            found = f"{self.size[0]}x{self.size[1]} pixels, which are written in tiles"
+            found = f"{self.size[0]}x{self.size[1]} pixels are rendered in tiles, without --aov"
             raise InputError(f"--aov {str(self.aov)!r}", found, "write an .exr, which also stores these quantities")
         if self.aov is not None:
             require_folder(self.aov, f"--aov {str(self.aov)!r}")
@@ -378,21 +379,21 @@ class Pictures:
             )
 
     def _check_size(self) -> None:
-        """Raise if nobody could wait for pictures of this size, or memory could not hold them."""
+        """Raise if the picture size is above the limit, or needs too much memory."""
         from translucent.files.reading import require_memory
 
         width, height = self.size
         requested, pixels = f"--size {width}x{height}", width * height
         if pixels > MOST_PIXELS:
-            found = f"{pixels / 1e6:.0f} million pixels, and {MOST_PIXELS / 1e6:.0f} million are the most"
+            found = f"{pixels / 1e6:.0f} million pixels are more than the limit of {MOST_PIXELS / 1e6:.0f} million"
             raise InputError(requested, found, "choose a smaller picture size, at most about 32768x32768")
         if not self.tiled:
-            do = "give a smaller size" if self.turntable else "give a smaller size, or write an .exr or .png, in tiles"
+            do = "give a smaller size" if self.turntable else "give a smaller size, or write an .exr or .png"
             found = f"{pixels / 1e6:.0f} million pixels at once"
             require_memory(requested, found, _PIXEL_BYTES * pixels, do)
 
     def write(self, scene: Scene, draw: Callable[[Scene], Frame]) -> Frame:
-        """Draw and write all of them; returns the first frame."""
+        """Render and write all pictures; returns the first frame."""
         if self.turntable is not None:
             return self._write_turntable(scene, draw, self.turntable)
         frame = draw(scene)
@@ -469,17 +470,16 @@ def black_text(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -> s
     tenth = thickness * math.log(10.0) / clearest if clearest > 0 else math.inf
     # How much clearer the medium would have to be for a fifth to pass.
     times = float(f"{clearest / math.log(5.0):.2g}")
-    clearer = f"with --dilute {times:.3g}, which makes the medium so many times as clear, a fifth would pass"
+    clearer = f"with --dilute {times:.3g}, a fifth of the light would pass"
     return (
         f"only {passed:.2%} of the light passes: the model is {extent_text(high - low)} and "
-        f"{short_length(thickness)} thick at the median, and this medium leaves a tenth of the light after "
-        f"{short_length(tenth)}; "
-        f"{_other_unit(high - low, depth, unit, own) or clearer}"
+        f"{short_length(thickness)} thick (median), and a tenth of the light is left after {short_length(tenth)} in "
+        f"this medium; {_other_unit(high - low, depth, unit, own) or clearer}"
     )
 
 
 def white_text(frame: Frame, exposure: float, tone: str) -> str:
-    """Warning where much of what media cover is beyond the white of a picture that clamps, with what shows it."""
+    """Warning that many pixels of media are brighter than white, with advice; empty for other pictures."""
     visible = frame.coverage & frame.valid
     if tone != "none" or not visible.any():
         return ""
@@ -488,8 +488,8 @@ def white_text(frame: Frame, exposure: float, tone: str) -> str:
         return ""
     darker = exposure - math.ceil(math.log2(float(np.quantile(bright, 0.95))))
     return (
-        f"{fraction:.0%} of what media cover is brighter than white, and shown as white; "
-        f"--tone neutral keeps its shape, and --exposure {darker:g} its brightness"
+        f"{fraction:.0%} of the pixels of media are brighter than white, and appear white; --tone neutral "
+        f"compresses them, and --exposure {darker:g} darkens the picture"
     )
 
 

@@ -58,7 +58,7 @@ class ReportOptions:
     )
     compare: Path | None = option(
         metavar="JSON",
-        help="Print which methods are slower or less accurate than in this report.json. The exit code is then 1.",
+        help="Print which methods are slower or less accurate than in this report.json. If any, the exit code is 1.",
     )
     medium: MediumOptions = group(MediumOptions)
     file: FileOptions = group(FileOptions, without=("draft_extensions",))
@@ -71,12 +71,12 @@ class ReportOptions:
 @click.argument("models", nargs=-1, metavar="[MODEL...]")
 @takes(ReportOptions)
 def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None:
-    """Measure the speed and the error of each method, on built-in scenes and on each MODEL.
+    """Measure the speed and the error of each method.
 
-    A MODEL is a file or the name of a built-in mesh. --color or --preset fills each MODEL with a medium, and the report
-    states whether the error of each method would be visible. Opaque parts are not measured. Ctrl-C stops the
-    measurements, and the report contains the finished scenes. Without -o and --compare, all numbers are printed, and no
-    file is written.
+    The command measures built-in scenes and each MODEL. A MODEL is a file or the name of a built-in mesh. --color
+    or --preset fills each MODEL with a medium, and the report states whether the error of each method would be
+    visible. Opaque parts are not measured. Ctrl-C stops the measurements, and the report contains the finished
+    scenes. Without -o and --compare, all numbers are printed, and no file is written.
     """
     from translucent.bench.judgement import agreement, compare_reports, machines_differ
     from translucent.bench.output import checked_folder, read_report, table, write_outputs
@@ -90,7 +90,7 @@ def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None
             "omit --from to measure, or omit MODEL, its medium and the options of a measurement",
         )
     if models and parts and "scenes" not in parts:
-        do = "add scenes, or leave MODEL out"
+        do = "add the part scenes, or omit MODEL"
         raise InputError(
             f"--only {given.only}", "a MODEL is measured as one of the scenes, so the part 'scenes' is needed", do
         )
@@ -116,7 +116,7 @@ def report(models: tuple[str, ...], given: ReportOptions, as_json: bool) -> None
     changes = None if before is None else compare_reports(before, made)
     agreed = None if before is None else agreement(before, made)
     if before is not None and (difference := machines_differ(before, made)) is not None:
-        echo(f"warning: times of two machines are compared: {difference}", err=True)
+        echo(f"warning: the two reports come from different machines: {difference}", err=True)
     if as_json:
         echo(json.dumps(_summary(made, files, changes, agreed)))
     else:
@@ -145,7 +145,7 @@ def _measured(
 ) -> Report:
     """Measure a report with progress on stderr; each finished scene is in ``report.json`` at once."""
     if base is None:
-        echo("preparing the report: the first measurement takes a while", err=True)
+        echo("preparing the report: the first measurement takes the longest", err=True)
     from translucent.bench.cases import model_cases
     from translucent.bench.output import write_report
     from translucent.bench.run import FULL_SIZE, QUICK_SIZE, ReportRequest, measure_all
@@ -207,7 +207,7 @@ def _parts(only: str | None) -> tuple[Part, ...]:
     for name in named:
         if name not in known:
             close = difflib.get_close_matches(name, known, n=1)
-            do = f"did you mean {close[0]}?" if close else f"use some of {', '.join(known)}"
+            do = f"did you mean {close[0]}?" if close else f"use one or more of {', '.join(known)}"
             raise InputError(f"--only {only}", f"the report has no part {name!r}", do)
     return tuple(part for part in known if part in named)
 
@@ -280,7 +280,7 @@ def _echo_visibility(answer: dict[str, Any]) -> None:
     if answer["seen"]:
         echo(f"  with it, {answer['seen']}")
     if answer["cheaper_seen"]:
-        echo(f"  with {answer['cheaper']}, which is cheaper, {answer['cheaper_seen']}")
+        echo(f"  with {answer['cheaper']}, which is faster, {answer['cheaper_seen']}")
 
 
 def _echo(made: Report, files: list[Path], changes: Any, agreed: Agreement | None) -> None:
@@ -293,7 +293,7 @@ def _echo(made: Report, files: list[Path], changes: Any, agreed: Agreement | Non
         if answer["method"] is None:
             echo(f"{answer['case']:<20} -")
             continue
-        mark = "" if answer["good_enough"] else "  (not good enough, the most accurate)"
+        mark = "" if answer["good_enough"] else "  (not good enough, although the most accurate)"
         numbers = f"{answer['ratio']:>8.2f} {answer['rms_error']:>10.1e} {answer['p999_error']:>8.1e}"
         echo(f"{answer['case']:<20} {answer['method']:<30} {numbers} {answer['quantity']}{mark}")
         if answer["case"].startswith(MODEL_CASE):
@@ -310,7 +310,7 @@ def _echo(made: Report, files: list[Path], changes: Any, agreed: Agreement | Non
         for change in changes:
             echo(str(change))
         if not changes:
-            echo("nothing got slower or less accurate, beyond noise")
+            echo("no method became slower or less accurate, within the noise")
         echo(str(agreed))
     for path in files:
         echo(str(path))

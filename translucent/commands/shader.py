@@ -102,10 +102,11 @@ process.stdout.write(JSON.stringify(answer));
 )
 @common_options
 def shader(name: str | None, defines: tuple[str, ...], target: Dialect | Language, as_json: bool) -> None:
-    """Print the shader NAME as a single text, with constants and included files inserted, and without unused code.
+    """Print the shader NAME as a single text.
 
-    NAME is the path of a file in shaders/, or its file name if no other file has the same name. Without NAME, the
-    command lists all shaders with their switches. --json also lists the sets of switch values that each shader accepts.
+    Constants and included files are inserted, and unused code is left out. NAME is the path of a file in shaders/,
+    or its file name if no other file has the same name. Without NAME, the command lists all shaders with their
+    switches. --json also lists the sets of switch values that each shader accepts.
 
     The target glsl is GLSL for OpenGL 3.3, webgl2 is GLSL for WebGL2 and OpenGL ES 3.0, and vulkan is GLSL for Vulkan.
     Translators convert the GLSL for Vulkan to hlsl, msl (Metal) and wgsl (WebGPU). These translators must be installed:
@@ -178,7 +179,7 @@ def _define(text: str) -> tuple[str, int]:
 
 
 def with_block_names(module: bytes) -> bytes:
-    """Module whose uniform blocks without a name of their own are called as their types, in small letters.
+    """SPIR-V module in which unnamed uniform blocks get the name of their type, in lower case.
 
     Translators put the names in front of those of the members, or numbers that change with every edit.
     """

@@ -48,9 +48,8 @@ def _stage_words() -> str:
     from translucent.scene.stages import STAGES
 
     return (
-        f"Ground, backdrop and lights of the model: {', '.join(STAGES)}, none, or auto (as render). Default: the "
-        f"stage of "
-        "the last window, at first auto; with a script, none."
+        f"Ground, backdrop and lights of the model: {', '.join(STAGES)}, none, or auto (the choice of translucent "
+        "render). Default: the stage of the last session, or auto; with --script, none."
     )
 
 
@@ -73,7 +72,9 @@ class PreviewOptions:
 @models_argument(required=False)
 @takes(PreviewOptions)
 def preview(model: str | None, given: PreviewOptions, as_json: bool) -> None:
-    """Open MODEL, which is a file or a built-in mesh, in a window. Without MODEL, the window shows a goblet.
+    """Open MODEL in a window.
+
+    MODEL is a file or a built-in mesh. Without MODEL, the window shows a goblet.
 
     With --script, the window runs the actions of the script, and closes. --screenshot saves a picture of the window. If
     an action fails, the next actions still run, and the exit code is 2 for a wrong request, and 1 for any other
@@ -142,7 +143,7 @@ def require_display() -> None:
     RenderError
         It names the way without a window.
     """
-    without = "without a window: translucent render MODEL -o picture.png"
+    without = "to render without a window, use translucent render MODEL -o picture.png"
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise RenderError("preview", "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)", without)
     require_package("imgui_bundle", "preview", without)
@@ -190,11 +191,12 @@ class PageOptions:
 @models_argument()
 @takes(PageOptions)
 def page(model: str, given: PageOptions, as_json: bool) -> None:
-    """Write MODEL, which is a file or a built-in mesh, as an HTML page for any browser with WebGL2.
+    """Write MODEL as an interactive HTML page.
 
-    The page is one file, which fetches nothing from the network. On the page, you can turn the model, change its
-    material on a panel, show its thickness in false colors, and probe single pixels. The page runs the passes of the
-    renderer. The command prints the effects that the page leaves out, and the page lists them, too.
+    MODEL is a file or a built-in mesh. The page works in any browser with WebGL2. The page is one file, which
+    fetches nothing from the network. On the page, you can turn the model, change its material on a panel, show its
+    thickness in false colors, and probe single pixels. The page runs the passes of the renderer. The command prints
+    the effects that the page leaves out, and the page lists them, too.
     """
     from translucent.files.paths import write_text_atomically
     from translucent.page.plans import plan_page, simplified, triangles

@@ -306,7 +306,7 @@ class Outline:
         return number.astype(np.int64), doubt > 0
 
     def _add_changes(self, change: Array, band: Band, edge: Integers, row: Integers, tolerance: Array) -> None:
-        """Add what changes at each column from that to the left of it, where edges (k,) cross rows (k,)."""
+        """Add the change of the face count at each column, where edges (k,) cross rows (k,)."""
         line = (row - band.first_row) * (band.width + 1)
         size = change.shape[1]
         crossed = (self.start[edge, 1] <= row) & (row < self.end[edge, 1])

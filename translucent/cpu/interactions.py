@@ -64,7 +64,7 @@ class MicrofacetSamples:
 
 @lru_cache(maxsize=4)
 def _sobol(samples: int) -> Array:
-    """(samples, 2 INTERFACES): scrambled, so that they are not those of the pixel's own samples."""
+    """(samples, 2 INTERFACES): Sobol points, scrambled to be independent of the pixel samples."""
     from scipy.stats import qmc
 
     with warnings.catch_warnings():

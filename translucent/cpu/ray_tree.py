@@ -44,7 +44,7 @@ from translucent.threads import end_if_stopped
 
 
 class SegmentMedia:
-    """Media of a scene, as segments of rays cross them.
+    """Media of a scene, with emission and transmittance along ray segments.
 
     Parameters
     ----------

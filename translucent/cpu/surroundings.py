@@ -67,7 +67,7 @@ def onto_planes(points: Array, directions: Array, flat: Array) -> Array:
 def normal_differentials(
     caster: SceneRayCaster, face: Integers, origins: Array, points: Array, normals: Array
 ) -> Array:
-    """Differentials of smooth normals (k, 3), which are turned as these are, at places on faces."""
+    """Differentials of smooth normals (k, 3) at points of faces."""
     corners = caster.smooth[face].astype(np.float64)
     weights = caster.barycentric(face, origins)
     first, second = caster.faces.edges[face].transpose(1, 0, 2)

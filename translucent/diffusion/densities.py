@@ -88,7 +88,7 @@ class Densities:
 
 
 def even_densities(grid: BodyGrid) -> Densities:
-    """Densities of a body of one density, 1."""
+    """Densities of a homogeneous body: 1 everywhere."""
     return Densities(np.ones(grid.count), grid.below[1], np.inf, grid)
 
 

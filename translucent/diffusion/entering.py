@@ -125,7 +125,7 @@ _CORRECTION = (0.5, 2.0)
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Rotation or reflection, and shift, of a body that is stretched along its own axes, to where it is in the world.
+    """Rotation or reflection, and translation, from a stretched body to the world.
 
     Its light depends on the stretch, and on where what lights it is as seen from there.
 
@@ -278,7 +278,7 @@ def environment_parts(
 
 
 def suns_of(environment: Environment) -> tuple[DirectionalLight, ...]:
-    """Lights for the parts of an environment that are brighter than `SUN` times its mean: for what exceeds that.
+    """Directional lights for the parts of an environment brighter than `SUN` times its mean.
 
     All of them together are smaller than 1 / `SUN` of the sphere. Their light comes from one direction in each of
     `DIRECTIONS` parts of it.
@@ -377,7 +377,7 @@ def sky_light(
     ior: float,
     mirrored: float,
 ) -> tuple[Array, EnteringRays]:
-    """Light of the environment: flux (s, 3) that enters as uniform light does, and rays for all else.
+    """Light of the environment: uniform flux (s, 3) at the samples, and rays for the rest.
 
     Of each sample, the least radiance in the directions above it is uniform. `SKY_RAYS` rays have the rest: each an
     equal part of the flux, in the order of the directions, and all of it from one of them, chosen by its flux.
@@ -486,7 +486,7 @@ def from_light(
 
 
 def _spread(towards: Array, face_normals: Array, area: float) -> tuple[Array, Array]:
-    """Depth below its place at which each sample sees a light that is very near, and the gain of its light, (s,) each.
+    """Depth below the surface at which each sample receives a very near light, and the factor of its light, (s,) each.
 
     A light that is nearer to the surface than its samples are to each other shines on a spot between them. On a plane
     the irradiance h / (r^2 + h^2)^(3/2) of a point light at height h has the same integral 2 pi for every h: as seen

@@ -1,4 +1,4 @@
-"""Light of an environment that a medium scatters ahead: the background as a medium blurs it, by optical depth.
+"""Environment light after forward scattering: the background, blurred by a medium, by optical depth.
 
 References
 ----------
@@ -31,7 +31,7 @@ _MOST_EVENTS, _LEAST_POWER = 128, 0.05
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentAhead:
-    """Radiance along rays by light that was scattered ahead on its way.
+    """Radiance along rays by light that was scattered forward.
 
     A Legendre moment of order l > 2 of the environment is multiplied by exp(-(1 - g^l) depth) - exp(-depth): as by a
     Poisson number n > 0 of events, of g^n together. Of lower orders cells hold what has turned, and 1 - g^l is the
@@ -53,7 +53,7 @@ class EnvironmentAhead:
 @lru_cache(maxsize=2)
 @np.errstate(under="ignore")
 def environment_ahead(environment: Environment, anisotropy: float, straight: float) -> EnvironmentAhead | None:
-    """Find what media of a mean cosine g > 0 scatter ahead of an environment; None if it is black.
+    """Forward-scattered light of an environment in media with a mean cosine g > 0; None if it is black.
 
     `straight` is the fraction of scattered light that counts as unscattered in cells.
     """

@@ -188,7 +188,7 @@ class EntryPaths:
         return number, place - number
 
     def at_cosine(self, values: Array | float) -> Array | float:
-        """(k,): values that are given at `_COSINES`; one that is given for all of them stays."""
+        """(k,): values tabulated at `_COSINES`, interpolated; a constant stays as it is."""
         if np.ndim(values) == 0:
             return values
         (number, fraction), table = self._between, np.asarray(values)
@@ -216,7 +216,7 @@ class EntryPaths:
 
 
 def diffuse_paths(grid: BodyGrid, dense: Densities, ior: float) -> EntryPaths:
-    """One path below each sample, in directions that are distributed as those of uniform light from outside."""
+    """One path below each sample, with directions distributed as those of uniform light from outside."""
     directions, samples = grid.inward_directions(ior), np.arange(len(grid.points))
     return EntryPaths.of(grid, dense, samples, directions, diffuse_interface(ior).mean_cosine, diffuse=True)
 

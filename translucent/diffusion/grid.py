@@ -289,7 +289,7 @@ class BodyGrid:
 
     @cached_property
     def parallel(self) -> Array:
-        """(k,): how much each sample of `across` and the one on the other side are those of one wall, 0 to 1."""
+        """(k,): how parallel the two sides of a wall are at each sample of `across`, 0 to 1."""
         thin, other = self.across
         cosine = (self.face_normals[thin] * self.face_normals[other]).sum(axis=1)
         return np.asarray(np.clip((ASLANT - cosine) / (ASLANT - PARALLEL), 0.0, 1.0))
@@ -369,7 +369,9 @@ class BodyGrid:
         return within
 
     def _reads(self, points: Array, normals: Array) -> tuple[sparse.csr_array, Array, Array]:
-        """Interpolation of the fluence beside inclusions: at points (k, 3) with normals (k, 3); depth and `spread`."""
+        """Interpolation weights of the fluence near inclusions, at points (k, 3) with normals (k, 3); depth and
+        `spread`.
+        """
         cells, weights = np.zeros((len(points), 8), np.int64), np.zeros((len(points), 8))
         heights, missing = np.zeros((len(points), 8)), np.arange(len(points))
         places = (points - self.cells.low) / self.cells.step
@@ -391,7 +393,7 @@ class BodyGrid:
 
     @cached_property
     def reads(self) -> sparse.csr_array:
-        """Interpolation of the fluence below all samples of the surface, and then beside those of inclusions."""
+        """Interpolation weights of the fluence at all samples of the surface, and then of inclusions."""
         return (
             self.below[0]
             if self.inclusions is None
@@ -408,7 +410,7 @@ class BodyGrid:
 
     @cached_property
     def block_pairs(self) -> Integers:
-        """(n,): number of the pair of blocks that each number of the linear system stands between."""
+        """(n,): pair of blocks to which each entry of the linear system belongs."""
         of = self.blocks
         return np.asarray(of[self.pattern.rows] * (of.max(initial=-1) + 1) + of[self.pattern.columns])
 
@@ -487,7 +489,7 @@ class BodyGrid:
         return np.asarray(np.einsum("kci,ki->kc", places[:, None] - centers, self.face_normals[samples]))
 
     def _nearest(self, samples: Integers) -> tuple[Integers, Integers]:
-        """Those of samples (k,) that have no cells around a point below them but one near, and the number of that."""
+        """Samples (k,) without cells around the point below them, and the number of the nearest cell."""
         found = np.full(len(samples), -1)
         places, normals = (self.points[samples] - self.cells.low) / self.cells.step, self.face_normals[samples]
         for depth in (0.02, 0.25, 0.5, 0.9, 1.3):
@@ -552,7 +554,7 @@ class MatrixPattern:
 
 
 def _placed(item: Object) -> tuple[Array, npt.NDArray[np.int32]]:
-    """Vertices (n, 3) of an object where its transform leads, and faces (m, 3), counter-clockwise from outside."""
+    """Vertices (n, 3) of an object after its transform, and faces (m, 3), counter-clockwise from outside."""
     corners = item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3]
     faces = np.asarray(item.mesh.faces, np.int32)
     return corners, faces[:, ::-1] if item.faces_inwards else faces
@@ -649,6 +651,6 @@ def other_plane_points(count: int) -> Array:
 
 
 def box_points(count: int) -> Array:
-    """(count, 3): the same recurrence in the unit cube."""
+    """(count, 3): points of a low-discrepancy sequence in the unit cube."""
     shifts = [0.8191725133961645, 0.6710436067037893, 0.5497004779019703]
     return np.asarray((0.5 + np.arange(count)[:, None] * shifts) % 1.0)

@@ -126,7 +126,7 @@ def _harmonic(index: int) -> Environment:
 def _check(body: Object, diffusion: Diffusion) -> None:
     requested, medium = f"scattered light of {body.mesh.name!r}", body.medium
     if medium is None or not medium.scatters:
-        do = "give one that does, for example --preset wax, or tl.scattering_medium('#f2e0b8', 0.002)"
+        do = "give a medium that scatters, such as --preset wax, or tl.scattering_medium('#f2e0b8', 0.002)"
         raise InputError(
             requested,
             "the medium of the body does not scatter light" if medium is not None else "the body has no medium",

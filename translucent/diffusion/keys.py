@@ -81,7 +81,7 @@ def diffusing_media(scene: Scene) -> dict[int, Medium]:
 
 
 def place_of(item: Object) -> tuple[object, bytes]:
-    """Mesh of an object, and where it is."""
+    """Mesh and transform of an object."""
     return item.mesh, item.matrix.tobytes()
 
 
@@ -102,7 +102,7 @@ def roughness_of(item: Object) -> float:
 
 
 def _bending(scene: Scene) -> Hashable:
-    """Everything beside the lights that the paths of photons depend on."""
+    """Everything except the lights that photon paths depend on."""
     objects = tuple(
         (
             place_of(item),
@@ -118,7 +118,7 @@ def _bending(scene: Scene) -> Hashable:
 
 
 def kept(store: OrderedDict[Hashable, _T], key: Hashable, make: Callable[[], _T], most: int) -> _T:
-    """Entry of a store, made if it is missing; beyond `most`, that which was used longest ago is dropped."""
+    """Entry of a cache, made if it is missing; beyond `most` entries, the least recently used one is dropped."""
     if key not in store:
         store[key] = make()
         if len(store) > most:

@@ -1,4 +1,4 @@
-"""Bodies in which light diffuses: what does not depend on the medium, on where they are, or on lights."""
+"""Diffusion bodies: everything that does not depend on the medium, on the position of the body, or on lights."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Entrance:
 
 @dataclass(frozen=True, eq=False)
 class BodyShape:
-    """Grid of a body in its own frame, and what it sees of the sky and of itself there.
+    """Diffusion grid of a body in its own frame, with its visibility of the sky and of itself.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ def body_shape(body: Object, step: float, opaque: Sequence[Object] = ()) -> Body
 
 @dataclass(frozen=True, eq=False)
 class LitBody:
-    """A body in which light diffuses where it is, among opaque objects, for any medium and lights.
+    """Diffusion body at its position among opaque objects, for any medium and lights.
 
     Attributes
     ----------
@@ -157,7 +157,7 @@ class LitBody:
         return [found[place] for place in places]
 
     def _paths(self, body: Object) -> sparse.csr_array:
-        """Metres in another body, of paths from a part of the samples; all samples take those of the nearest one."""
+        """Metres that paths from some samples cross in another body; all samples use the nearest of these paths."""
         points, part, sky = self.grid.points, slice(None, None, SAMPLES_FOR_PATH), self.shape.sky
         nearest = cKDTree(points[part]).query(points)[1]
         # Next to an edge samples face other directions: each takes every direction that its group of samples sees.
@@ -213,7 +213,7 @@ class LitBody:
         return cKDTree(self.grid.points)
 
     def exchange(self, ior: float, roughness: float) -> Exchange:
-        """Flux that enters for what leaves, through an interface with this index and roughness."""
+        """Flux that enters the body for flux that leaves it, through an interface with this index and roughness."""
         entrance, patches = self.entrance(ior, roughness), self.patches
         if patches is None:
             return Exchange(entrance.itself)
@@ -235,7 +235,7 @@ class LitBody:
 
 
 def own_frame(body: Object) -> Object:
-    """The body as it is stretched, neither rotated nor moved."""
+    """The body with the stretch of its transform, but without rotation and translation."""
     return replace(body, transform=Pose.of(body.matrix)[1])
 
 

@@ -339,7 +339,7 @@ class _PhotonTracer:
 
 
 def _reduced_extinction(item: Object) -> Array:
-    """(3,): extinction in 1/m of an object's medium, without what it scatters ahead."""
+    """(3,): extinction in 1/m of an object's medium, without forward scattering."""
     medium = scatterer_of(item)
     if medium is None or item.sheet_thickness is not None:
         return np.zeros(3)
@@ -362,7 +362,7 @@ _TOGETHER = 1 << 19
 
 @dataclass(frozen=True, eq=False)
 class FineCells:
-    """Cells that divide those of a coarser grid.
+    """Finer cells that subdivide the cells of a grid.
 
     Attributes
     ----------
@@ -382,7 +382,7 @@ class FineCells:
 
     @classmethod
     def of(cls, low: Array, step: float, shape: tuple[int, ...]) -> FineCells:
-        """Finest cells that there is room for, in a grid with cells of this side."""
+        """Finest subdivision that fits into memory, of a grid with cells of this side."""
         room = np.cbrt(MOST_CELLS / float(np.prod(shape)))
         finer = int(min(max(room, 1.0), FINER))
         return cls(low, step / finer, (shape[0] * finer, shape[1] * finer, shape[2] * finer), finer)

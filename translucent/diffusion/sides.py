@@ -123,7 +123,7 @@ def _rows(near: Floats, offset: Floats, normals: Floats, sample: Integers) -> tu
 
 
 def _fitted(weight: Floats, offset: Floats, normals: Floats) -> Floats:
-    """(k, 6, n): factors of values at offsets (k, n, 3) from cells, for what the linear fit to these has in the cells.
+    """(k, 6, n): weights of values at offsets (k, n, 3) from cells, for their linear fit at the cells.
 
     For each side, with weights (k, 6, n). Along the mean normal nothing changes. Where samples say little of a gradient
     it is small. All sums over samples are one product of matrices: only the weights differ from side to side.

@@ -127,7 +127,7 @@ class CellSystem:
         self._taken = float(absorbed.sum() + lost.sum())
 
     def even(self, source: Array) -> Array:
-        """Fluence (cells,) that is the same everywhere and loses as much as powers (cells,) bring."""
+        """Constant fluence (cells,) that loses as much power as `powers` (cells,) add."""
         return np.full(len(source), source.sum() / max(self._taken, np.finfo(np.float64).tiny))
 
     def solved(self, source: Array, near: Array | None = None, tolerance: float = TOLERANCE) -> tuple[Array, int]:
@@ -178,7 +178,7 @@ class CellSystem:
 
 
 def _approximate_inverse(grid: BodyGrid, matrix: sparse.csr_array) -> LinearOperator:
-    """Approximate inverse of a system: that of its diagonal, and that for solutions even in each block of cells.
+    """Preconditioner of a system: its diagonal, and a coarse correction that is constant in each block of cells.
 
     Errors that single cells see vanish in a few steps of conjugate gradients, and those as wide as the body in many:
     with the second part they need no more than others (Nicolaides 1987).
@@ -470,7 +470,7 @@ class _ChannelSystem:
         self._cells = CellSystem(grid, dense.diffusion_coefficients(d), absorbed, lost)
 
         def system(part: float, *, corrected: bool = True) -> _ChannelSystem:
-            """The same of a medium that absorbs a part of what it takes, around inclusions that absorb nothing."""
+            """Linear system of an absorbing medium around lossless inclusions."""
             a, b, white = part * extinction, (1.0 - part) * extinction, np.ones(len(self._inclusions.lost))
             same = partial(_ChannelSystem, grid, ior, roughness, a, b, dense, paths, scattered, walls=walls)
             return same(reflected=white, corrected=corrected)
@@ -484,7 +484,7 @@ class _ChannelSystem:
             self._correction = 1.0 + reflectance * (system(0.0, corrected=False).by_uniform_light() - 1.0)
 
     def by_uniform_light(self) -> Array:
-        """(s,): factors of the fluence with which a lossless body in uniform light is as invisible as it has to be.
+        """(s,): factors on the fluence that make a lossless body invisible in uniform light.
 
         Such a body is invisible, whatever its shape: all light that leaves has been scattered, except what passes
         straight through. Diffusion sends too much of it out of parts no thicker than a free path, and too little out
@@ -498,7 +498,7 @@ class _ChannelSystem:
         return np.asarray(np.clip(self.scattered / np.maximum(found, _TINY), LEAST_CORRECTION, MOST_CORRECTION))
 
     def _in_walls(self, slab: tuple[Array, Array], samples: Integers) -> Array:
-        """(s,): fluence in walls, for what light at samples (k,) adds on its side and across."""
+        """(s,): fluence in thin walls by light at samples (k,), on the same side and across."""
         own, other = (np.bincount(samples, part, len(self._grid.points)) for part in slab)
         return np.asarray(own + self._walls.area * other[self._walls.across])
 
@@ -552,7 +552,7 @@ class _ChannelSystem:
         return inside, at_samples, 0.25 * emission * self._ior**2 * self._chord * self._escape(every)
 
     def _escape(self, extinction: float) -> float:
-        """Fraction of what is sent out inside that leaves without an event, for an extinction at a density of 1."""
+        """Fraction of light from inside that leaves without an event, for an extinction at a density of 1."""
         mean = self._chord / (2.0 * self._grid.body.mean_thickness)
         return self._grid.escape_paths(self._ior).probability(extinction * mean)
 
@@ -576,7 +576,7 @@ class _ChannelSystem:
         return np.asarray(self._inclusions.diffuse(cells) + reaching / self._inclusions.area)
 
     def _power(self, flux: Array) -> Array:
-        """(cells,): power of uniform light that enters with a flux (s,): what is scattered, or reflected inside."""
+        """(cells,): power that uniform light with a flux (s,) adds by scattering and internal reflection."""
         power = self._diffuse.power(self._grid, self._all, flux)
         if self._grid.inclusions is None:
             return power
@@ -684,7 +684,7 @@ class _InclusionLosses:
 
     @classmethod
     def of(cls, grid: BodyGrid, absorption: float, d: float, reflected: Array) -> _InclusionLosses:
-        """Those of a grid."""
+        """Inclusion losses of a grid."""
         if (inner := grid.inclusions) is None:
             return cls(sparse.csr_array((0, grid.count)), np.zeros(0), np.zeros(0), np.zeros(0), 1.0)
         condition = (1.0 - reflected) / (2.0 * (1.0 + reflected)) / d

@@ -78,7 +78,7 @@ def swept(
 def swept_moments(
     extinction: Array, emission: Array, arriving: Array, directions: Array, solid_angles: Array, step: float
 ) -> Array:
-    """Fluence and vector flux in cells as of `swept`, for cells that may send more light in one direction than others.
+    """Fluence and vector flux in cells, like `swept`, for cells with directional emission.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ ORDER = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2])
 
 
 def condensed(extinction: Array, directions: Array, step: float) -> Array:
-    """Extinction (...) in 1/m that makes sweeps spread light as far as the given extinction does in truth.
+    """Extinction (...) in 1/m with which sweeps spread light as far as the true extinction does.
 
     In a sweep light is scattered on from anywhere in the cell where it was scattered, and gets into several cells of
     each slice: from event to event it goes too far. Along a direction of largest component m, with tangents t aside, it
@@ -335,7 +335,7 @@ def capped(phase: PhaseFunction, fraction: float) -> float:
 
 
 class VolumeGrid:
-    """Cells of a body and how dense each is; the same for all media and lights.
+    """Cells of a body and their densities, for all media and lights.
 
     Parameters
     ----------
@@ -402,7 +402,7 @@ class DiffusingVolume:
 
     @np.errstate(under="ignore")
     def field(self, scene: Scene, photons: PhotonFluence | None = None) -> VolumeField:
-        """Light in the body in a scene, from its environment and lights and what the medium emits.
+        """Scattered light in the body, from environment, lights and the emission of the medium.
 
         With `photons`, which carry the light that bodies refract and reflect, none of it goes straight through these.
         """
@@ -443,7 +443,7 @@ class DiffusingVolume:
 
     @property
     def _ahead(self) -> float:
-        """Mean cosine of a medium that scatters ahead, else 0: then only means over directions are found."""
+        """Mean cosine of a medium that scatters forward, else 0: then only means over directions are computed."""
         return self._medium.anisotropy if self._medium.anisotropy >= LEAST_AHEAD else 0.0
 
     def _from_lights(self, scene: Scene, stops: RayCaster | None) -> tuple[Array, Array]:

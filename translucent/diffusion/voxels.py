@@ -89,7 +89,7 @@ def cut_cells(
 
 
 def without(cells: Voxels, inner: Voxels) -> Voxels:
-    """Cut cells of a body without those of something inside it, on the same grid.
+    """Cut cells of a body, minus the cells of an object inside it, on the same grid.
 
     Where both surfaces cut a cell, as little of it is taken as the two fractions allow.
     """

@@ -68,7 +68,7 @@ class Walls:
 
     @classmethod
     def of(cls, grid: BodyGrid) -> Walls:
-        """Those of a grid; none where the density varies, and around opaque objects inside."""
+        """Thin walls of a diffusion grid; none where the density varies, and around opaque objects inside."""
         count, normals = len(grid.points), grid.face_normals
         part, across = np.zeros(count), np.arange(count)
         thickness = np.where(np.isfinite(grid.thickness), grid.thickness, 0.0)
@@ -89,7 +89,7 @@ class Walls:
 
     @cached_property
     def lit(self) -> Mask:
-        """(s,): samples whose light makes the fluence of walls: those of walls, and those across."""
+        """(s,): samples whose light enters thin walls, on either side."""
         found = self.part > 0.0
         found[self.across[found]] = True
         return found
@@ -162,7 +162,7 @@ class SlabSolution:
 
     @np.errstate(under="ignore")
     def events(self, samples: Integers, cosine: Array | float) -> tuple[Array, Array]:
-        """Fluence (k,) on the side where a unit of flux enters at samples (k,), and on the other one; 0 off walls.
+        """Fluence (k,) on the near side and on the far side for a unit of flux at samples (k,); 0 outside walls.
 
         Parameters
         ----------

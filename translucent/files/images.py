@@ -159,7 +159,7 @@ PICTURES = ("PNG", "JPEG", "BMP", "GIF", "TIFF", "WEBP", "TGA", "PPM")
 
 
 def read_array(
-    stream: IO[bytes], size: int, requested: str, do: str = "write it with numpy.save", kinds: str = "biuf"
+    stream: IO[bytes], size: int, requested: str, do: str = "write the file with numpy.save", kinds: str = "biuf"
 ) -> npt.NDArray[Any]:
     """Read the array of a .npy file.
 
@@ -263,7 +263,7 @@ def open_picture(
         except Image.DecompressionBombError:
             raise InputError(requested, "the picture has too many pixels", "use a smaller picture") from None
         except Exception as error:  # each of Pillow's readers raises its own kinds
-            found = f"it is not an image that can be read: none of {', '.join(formats)}"
+            found = f"the file is not a readable image of the format {' or '.join(formats)}"
             raise UnreadableError(requested, found, do) from error
         width, height = image.size
         require_room(requested, f"{width}x{height} pixels", per_pixel * width * height, len(data))
@@ -299,7 +299,7 @@ def read_exr(path: str | Path, requested: str) -> tuple[dict[str, Any], dict[str
 
 @contextlib.contextmanager
 def _silent() -> Iterator[None]:
-    """Drop what a library prints, in Python or in C: it names files as they are, with codes that terminals obey."""
+    """Discard output of a library, which may contain control codes for terminals."""
     with contextlib.ExitStack() as stack:
         stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
         with contextlib.suppress(OSError):  # of a process without standard error

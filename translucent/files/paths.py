@@ -75,7 +75,7 @@ def require_output(path: Path, requested: str) -> None:
 
 
 def _require_replaceable(path: Path, requested: str) -> None:
-    """Raise `InputError` where a written file would take the place of anything but a file."""
+    """Raise `InputError` if the output would replace something other than a regular file."""
     try:
         mode = os.stat(path).st_mode
     except (OSError, ValueError) as error:  # nothing is there, or what makes a file says why it cannot be there
@@ -90,7 +90,7 @@ def _require_replaceable(path: Path, requested: str) -> None:
 
 
 def require_folder(path: Path, requested: str) -> None:
-    """Raise unless the path is a folder, or one that can be made with its parents.
+    """Raise unless the path is a folder, or can be created as one.
 
     Parameters
     ----------
@@ -278,7 +278,7 @@ def made_folder(folder: Path) -> Iterator[None]:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, and those above it, unless it is there.
+    """Create a folder and its parents, unless it exists.
 
     Raises
     ------
@@ -301,7 +301,7 @@ NAME = "translucent"
 
 
 def config_folder() -> Path:
-    """Folder of settings; it need not be there."""
+    """Folder of settings, which may not exist yet."""
     if sys.platform == "win32":
         return Path(os.environ.get("APPDATA", Path.home())) / NAME
     if sys.platform == "darwin":
@@ -310,7 +310,7 @@ def config_folder() -> Path:
 
 
 def cache_folder() -> Path:
-    """Folder of what can be made again at any time; it need not be there."""
+    """Folder of caches, which may not exist yet."""
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA", Path.home())) / NAME / "Cache"
     if sys.platform == "darwin":

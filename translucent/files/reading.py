@@ -96,7 +96,7 @@ def read_bytes(path: str | Path, requested: str, limit: int = MAX_FILE) -> bytes
             raise InputError(requested, f"the file cannot be read ({error.strerror})", "check the disk") from None
 
 
-def read_text(path: str | Path, requested: str, limit: int = MAX_TEXT, do: str = "save it as text") -> str:
+def read_text(path: str | Path, requested: str, limit: int = MAX_TEXT, do: str = "save the file as UTF-8 text") -> str:
     """Read a file of UTF-8 text; raises `InputError` like `open_file`, or if it is not UTF-8."""
     try:
         return read_bytes(path, requested, limit).decode("utf-8-sig")
@@ -133,12 +133,12 @@ def linked_file(folder: Path, link: str, requested: str, allow_outside: bool = F
         raise InputError(requested, f"the link {link!r} names no file", "export the model again")
     path = folder / name
     if not allow_outside and not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
-        do = "keep its files together, or say --allow-outside (in Python, allow_outside=True)"
+        do = "keep all files together, or add --allow-outside (Python: allow_outside=True)"
         raise InputError(requested, f"the link {link!r} leads outside the folder of the model", do)
     return path
 
 
-def require_room(requested: str, found: str, size: int, stored: int, do: str = "make it smaller") -> None:
+def require_room(requested: str, found: str, size: int, stored: int, do: str = "use a smaller file") -> None:
     """Raise unless reading may take this much memory.
 
     Parameters
@@ -160,7 +160,7 @@ def require_room(requested: str, found: str, size: int, stored: int, do: str = "
         If it is more than `FREE` bytes, and more than `RATIO` times what is stored.
     """
     if size > (allowed := max(FREE, RATIO * stored)):
-        limit = f"of so small a file at most {size_text(allowed)} are read"
+        limit = f"the limit for a file of this size is {size_text(allowed)}"
         raise InputError(requested, f"{found} take {size_text(size)}; {limit}", do)
 
 
@@ -209,7 +209,7 @@ def toml_value(text: str) -> dict[str, Any]:
 
 
 def _refuse(word: str) -> None:
-    raise ValueError(f"{word} is no JSON number")
+    raise ValueError(f"{word} is not a JSON number")
 
 
 def _finite(text: str) -> float:
@@ -241,7 +241,7 @@ def _require_shallow(value: Any) -> None:
 
 
 def shown(error: BaseException) -> str:
-    """Short text of a library's error."""
+    """Error message of a library as short text."""
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
 
 
@@ -252,7 +252,7 @@ _MACHINE, _GROUP = Path("/proc/meminfo"), Path("/sys/fs/cgroup")
 
 
 def free_memory() -> int | None:
-    """Bytes that this process can take, of the machine and of the container that it runs in; None where nobody says."""
+    """Free memory in bytes, of the machine or the container; None if it is unknown."""
     try:
         fields = dict(line.split(":", 1) for line in _MACHINE.read_text().splitlines())
         free = 1024 * int(fields["MemAvailable"].split()[0])
@@ -267,7 +267,7 @@ def free_memory() -> int | None:
 
 
 def require_memory(requested: str, found: str, size: int, do: str) -> None:
-    """Raise `InputError` where as much memory is not free.
+    """Raise `InputError` if this much memory is not free.
 
     Parameters
     ----------
@@ -301,5 +301,5 @@ def require_allowed(requested: str, size: int) -> None:
         return
     free = max(limit - resource.getpagesize() * int(Path("/proc/self/statm").read_text().split()[0]), 0)
     if free < size:
-        found = f"it takes {size_text(size)} of memory, and the limit of this process leaves {size_text(free)}"
+        found = f"this needs {size_text(size)} of memory, but the limit of this process leaves only {size_text(free)}"
         raise RenderError(requested, found, "raise the limit (ulimit -v)")

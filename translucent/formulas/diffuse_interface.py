@@ -198,7 +198,7 @@ def half_space_reflectances(
 
 @lru_cache(maxsize=1024)
 def _half_space(albedo: float, ior: float, phase: PhaseFunction) -> tuple[Array, Array, Array]:
-    """Cosines inside, flux of uniform radiance around each, and the reflectance of light that enters there.
+    """Quadrature over cosines inside the medium: cosines, fluxes, and reflectances of the interface.
 
     The bare half-space reflects as Chandrasekhar's H functions say where it scatters to all sides alike, else as its
     modes do (`bare_half_space`); its interface mirrors part of that back, and the half-space reflects it again: one

@@ -53,7 +53,7 @@ def sphere_point(shares: npt.ArrayLike) -> Array:
 
 
 def nearest_on_disc(disc: npt.ArrayLike, direction: npt.ArrayLike) -> Array:
-    """Unit vectors (..., 3) to where discs are nearest to directions, from which highlights come (Karis 2013).
+    """Unit vectors (..., 3) to the point of a disc nearest to each direction, for highlights (Karis 2013).
 
     Parameters
     ----------

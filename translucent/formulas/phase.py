@@ -188,7 +188,7 @@ class PhaseFunction(ABC):
 
     @property
     def mean_cosine(self) -> float:
-        """Mean cosine g of the scattering angle: 0 where as much goes on as back."""
+        """Mean cosine g of the scattering angle."""
         return float(self.moments(2)[1])
 
     @abstractmethod

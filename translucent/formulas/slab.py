@@ -34,7 +34,7 @@ _LEAST, _MOST, _BETWEEN, _START = -5, 6, 2, -24
 
 @dataclass(frozen=True, eq=False)
 class SlabFluxes:
-    """Fractions of light that has entered a slab, and leaves it scattered, on the same side and on the other one.
+    """Fractions of the light inside a slab that leave scattered, on the same side and on the other side.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ def _phases(cosine: Array, moments: Array) -> tuple[Array, Array]:
 
 
 def _between_interfaces(back: Array, on: Array, mirrored: Array, leaves: Array) -> tuple[Array, Array]:
-    """Flux that leaves on the same side and on the other one, (n,) each, for radiance down at each cosine.
+    """Flux that leaves on the same side and on the other side, (n,) each, for downward radiance at each cosine.
 
     Light from both sides at once, alike or opposite, meets one mirror only.
     """

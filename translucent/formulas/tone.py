@@ -44,7 +44,7 @@ def tone_none(linear: npt.ArrayLike) -> Array:
 
 
 def tone_neutral(linear: npt.ArrayLike) -> Array:
-    """Khronos PBR Neutral: base colors up to 0.8 as they are lit, less what a dielectric reflects; highlights to white.
+    """Khronos PBR Neutral tone curve: keeps base colors up to 0.8, and compresses highlights to white.
 
     Parameters
     ----------

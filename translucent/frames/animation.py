@@ -177,7 +177,7 @@ def _alike(frames: Iterable[Pixels]) -> Iterator[Pixels]:
     def checked() -> Iterator[Pixels]:
         for i, picture in enumerate(chain([first], pictures)):
             if picture.shape != first.shape or picture.dtype != np.uint8 or picture.shape[2:] != (3,):
-                found = f"shape {picture.shape} and type {picture.dtype}"
+                found = f"the frame has the shape {picture.shape} and the type {picture.dtype}"
                 raise InputError(
                     f"frame {i} of an animation", found, "give arrays (h, w, 3) of uint8, all of the same size"
                 )

@@ -48,7 +48,7 @@ def aov_pictures(arrays: Arrays, truth: Arrays | None = None) -> dict[str, Pixel
     if truth is not None:
         (height, width), (rows, columns) = thickness.shape, truth["thickness"].shape
         if (height, width) != (rows, columns):
-            found = f"it has {columns}x{rows} pixels, and the frame {width}x{height}"
+            found = f"the truth has {columns}x{rows} pixels, and the frame has {width}x{height}"
             raise InputError("truth of a frame", found, "render the frame and the truth at the same size")
         off = np.abs(thickness.astype(np.float64) - truth["thickness"])
         pictures["error"] = lengths_picture(off, coverage | truth["coverage"], valid)

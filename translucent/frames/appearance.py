@@ -106,7 +106,7 @@ def appearance_of(seen: Frame | npt.ArrayLike, medium: Medium) -> Appearance:
 
 
 def thickness_samples(seen: Frame | npt.ArrayLike) -> Array:
-    """Samples of thickness in metres: a frame's covered and valid pixels, or an array as it is, flat.
+    """Thickness samples in metres: the covered and valid pixels of a frame, or a flattened array.
 
     Raises
     ------
@@ -191,13 +191,17 @@ def medium_for_average_color(seen: Frame | npt.ArrayLike, color: str | npt.Array
 
 def _solve(thickness: Array, name: str, target: float) -> float:
     if not CLAMP <= target <= 1:
-        do = "a medium cannot add light" if target > 1 else f"give {CLAMP:g} or more: darker is black on any display"
+        do = (
+            "use a color below 1: a medium cannot amplify light"
+            if target > 1
+            else (f"use {CLAMP:g} or more: darker colors look black on any display")
+        )
         raise InputError(f"average color with {name} = {target:g}", f"the value must satisfy {CLAMP:g} <= t <= 1", do)
     if target == 1:
         return 0.0
     clear = float(np.mean(thickness == 0))
     if target <= clear:
-        found = f"{100 * clear:.3g} % of the pixels have no thickness and stay white"
+        found = f"{100 * clear:.3g} % of the pixels have a thickness of 0 and stay white"
         raise InputError(f"average color with {name} = {target:g}", found, "choose a brighter color, or another view")
     # Without a unit: lengths as fractions of the mean one, so that neither kilometers nor micrometers overflow.
     scale = float(thickness.mean())

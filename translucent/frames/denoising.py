@@ -1,4 +1,4 @@
-"""Noise taken out of pictures by Open Image Denoise, with what is seen through clear glass as its features.
+"""Denoising of pictures by Open Image Denoise, with features seen through clear glass.
 
 A denoiser blurs across what it takes for noise and keeps edges of its features: the albedo and the normal at each
 pixel. Renderers commonly give those of the first surface, which for glass say nothing of what is behind it. Here rays
@@ -38,7 +38,7 @@ SCATTERED_ALBEDO = 0.8
 
 
 def denoised(frame: Frame, scene: Scene, guide: Floats | None = None) -> Frame:
-    """Frame with its radiance denoised, and without a standard error: of what a network makes, none is known.
+    """Frame with denoised radiance, and without a standard error, which is unknown for denoised pictures.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def features(scene: Scene, size: tuple[int, int]) -> tuple[Floats, Floats]:
 
 
 class _Rays:
-    """Rays from the camera on their way through clear glass; lengths in radii of the caster.
+    """Camera rays on their way through clear glass; lengths in radii of the caster.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ from translucent.scene.scene import Scene
 
 
 class Deferred:
-    """Array that is made when it is first read, from values that nobody changes.
+    """Array that is computed when it is first read.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Deferred:
 
 
 def thickness_of(marked: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """(h, w): magnitude of a thickness whose sign bit marks what is not valid."""
+    """(h, w): thickness without its sign bit, which marks invalid pixels."""
     found: npt.NDArray[np.float32] = np.abs(marked)
     return found
 
@@ -185,7 +185,7 @@ class Frame:
             return self.__dict__.setdefault(name, deferred.made())
 
     def __dir__(self) -> list[str]:
-        """Names, those of arrays that nobody has read yet included."""
+        """Attribute names, including arrays that are not computed yet."""
         return sorted({*super().__dir__(), *self.__dict__.get(_DEFERRED, {})})
 
     def rendered_from(self, scene: Scene, plan: RenderPlan) -> Frame:
@@ -337,7 +337,7 @@ class Frame:
         return frame_bundle(self.to_srgb8(), self.arrays, str(self.plan).partition("\n")[0], repr(self))
 
     def _repr_html_(self) -> str:
-        """The same, for front ends that know no bundles."""
+        """HTML of the frame for notebooks without rich bundles."""
         return str(self._repr_mimebundle_()[0]["text/html"])
 
     def _repr_png_(self) -> bytes:

@@ -98,12 +98,12 @@ def compare(
                 "give a mask of this shape, as `interior` returns it",
             )
         used &= mask
-        words += ", within the given mask"
+        words += ", and inside the mask"
     if not used.any():
         raise InputError(
             "compare",
-            f"no pixel is {words}: the frame covers {int(frame.coverage.sum())}, {int((~frame.valid).sum())} invalid, "
-            f"the truth {int(truth.coverage.sum())}, {int((~truth.valid).sum())} invalid",
+            f"no pixel is {words}: the frame covers {int(frame.coverage.sum())} pixels ({int((~frame.valid).sum())} "
+            f"invalid), the truth {int(truth.coverage.sum())} ({int((~truth.valid).sum())} invalid)",
             "check that both pictures show the body, and that the mesh of the body is closed",
         )
     error = (

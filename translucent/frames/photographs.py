@@ -30,7 +30,7 @@ LOSSY = (".jpg", ".jpeg", ".webp")
 
 
 class LinearPicture(NamedTuple):
-    """Photograph in linear values, with what is known of its rounding.
+    """Photograph in linear values, with the size of its rounding errors.
 
     Attributes
     ----------
@@ -248,7 +248,7 @@ def _photograph(table: dict[str, Any], what_for: str, path: Path, unit: str) -> 
 
 
 def _steps(photograph: Photograph, number: int, left_out: list[str]) -> PatchTransmittances:
-    """Transmittances of a photograph's patches; what is left out of them is `left_out`."""
+    """Transmittances of the patches of a photograph; `left_out` lists unusable patches."""
     given = photograph.picture
     if isinstance(given, str | Path):
         picture, name = read_picture(given), Path(given).name
@@ -284,7 +284,10 @@ def _depth(patch: _Mean, white: _Mean, what: str, left_out: list[str]) -> tuple[
     bright = patch.mean > white.mean + 5.0 * np.sqrt(patch.variance + white.variance) + 0.02 * white.mean
     if (bright & (patch.saturated <= MOST_LIMITED)).any():
         channel = int(np.flatnonzero(bright)[0])
-        found = f"{CHANNELS[channel]} {patch.mean[channel]:.3g} is above the white's {white.mean[channel]:.3g}"
+        found = (
+            f"{CHANNELS[channel]} {patch.mean[channel]:.3g} is brighter than the white rectangle, "
+            f"{white.mean[channel]:.3g}"
+        )
         raise InputError(
             what, found, "choose a white rectangle beside the patches, where the bare backlight is visible"
         )

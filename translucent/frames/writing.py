@@ -58,7 +58,7 @@ def frame_text(thickness: npt.NDArray[Any], coverage: Mask, valid: Mask) -> str:
         median, most = (length_text(float(found)) for found in (np.median(visible), visible.max()))
         said += f", {median} thick in the median and {most} at most"
     invalid = int((~valid).sum())
-    return said + (f"; {invalid} pixels cannot be trusted" if invalid else "")
+    return said + (f"; {invalid} pixels are invalid" if invalid else "")
 
 
 def bundle(pictures: Sequence[tuple[bytes, str]], lines: Sequence[str], text: str) -> Bundle:

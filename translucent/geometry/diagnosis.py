@@ -133,11 +133,11 @@ class Diagnosis:
             if finding
         ]
         if self.inverted:
-            lines.append("inverted: all faces look inwards")
+            lines.append("inverted: all faces point inwards")
         if self.inside_out_parts:
             lines.append(f"{self.inside_out_parts} closed parts inside out")
         elif self.solid and self.negative_winding:
-            lines.append("inside out in places: the surface crosses itself, and a lobe of it looks inwards")
+            lines.append("inside out in places: the surface intersects itself, and the faces of one lobe point inwards")
         return tuple(lines)
 
     def __str__(self) -> str:
@@ -230,7 +230,7 @@ class _Edges:
 
 
 def _is_one_sheet(faces: npt.NDArray[np.integer], edges: _Edges | None, components: int) -> bool:
-    """True if edges join all faces, and none has more than two: a face twice would be a part of its own."""
+    """True if all faces are connected by edges of at most two faces."""
     if edges is None:
         return len(faces) > 2
     return components == 1 and len(edges.faces) > 2 and bool((edges.sizes <= 2).all())

@@ -1,4 +1,4 @@
-"""Meshes of other libraries, told by their attributes: trimesh, PyVista, and any object with vertices and faces.
+"""Meshes of other libraries, recognized by their attributes: trimesh, PyVista, and similar objects.
 
 None of these libraries is imported. What is no mesh of triangles is refused by a sentence that says how to make one.
 """
@@ -58,7 +58,7 @@ def unit_of(thing: Any, unit: str | None = None) -> tuple[float, str]:
     parts = thing.geometry.values() if is_scene(thing) else [thing]
     units = {getattr(part, "units", None) for part in parts}
     if len(units) > 1:
-        found = f"its parts are in different units: {', '.join(sorted(map(str, units)))}"
+        found = f"the parts of the scene have different units: {', '.join(sorted(map(str, units)))}"
         raise InputError(
             f"scene {foreign_name(thing)!r}", found, "convert all meshes to metres: scene.convert_units('meters')"
         )
@@ -70,12 +70,12 @@ def unit_of(thing: Any, unit: str | None = None) -> tuple[float, str]:
     try:
         return float(import_trimesh("trimesh.units").unit_conversion(own, "meters")), ""
     except (KeyError, ValueError):
-        do = f"give unit=, one of {', '.join(METRES_PER_UNIT)}"
+        do = f"state unit=, one of {', '.join(METRES_PER_UNIT)}"
         raise InputError(f"mesh {foreign_name(thing)!r}", f"the unit {own!r} of the mesh is not known", do) from None
 
 
 def foreign_parts(thing: Any) -> list[Part] | None:
-    """Triangles of an object of another library, those of a scene where it places them; None if it is no mesh.
+    """Triangles of an object of another library, placed in its scene; None if the object is no mesh.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def foreign_parts(thing: Any) -> list[Part] | None:
     if hasattr(thing, "extract_surface"):  # grids, blocks and points of PyVista
         if not getattr(thing, "n_cells", 1):
             raise _faceless(thing)
-        do = "give its surface: grid.extract_surface().triangulate()"
+        do = "use its surface: grid.extract_surface().triangulate()"
         raise InputError(
             f"mesh {foreign_name(thing)!r}", f"an object of type {type(thing).__name__} is not a surface", do
         )
@@ -101,13 +101,13 @@ def foreign_parts(thing: Any) -> list[Part] | None:
 
 
 def _faceless(thing: Any) -> InputError:
-    """Error about points and lines of PyVista, and about what is empty."""
+    """Error for PyVista points, lines and empty meshes."""
     counts = [(getattr(thing, f"n_{name}", 0), name) for name in ("points", "lines")]
     found = " and ".join(f"{count} {name}" for count, name in counts if count)
     surface = "points, cloud.reconstruct_surface().triangulate(), or of lines, line.tube(radius=1).triangulate()"
     return InputError(
         f"mesh {foreign_name(thing)!r}",
-        f"the mesh has {found or 'no points'} but no faces",
+        f"the mesh has {found or 'no points'} and no faces",
         f"make a surface from {surface}",
     )
 
@@ -125,7 +125,7 @@ def _triangles(thing: Any, name: str) -> npt.NDArray[np.int32]:
     """(m, 3): corners of the faces, which PyVista stores in one row, each behind their number."""
     asked, advice = f"mesh {foreign_name(thing)!r}", "triangulate it"
     if hasattr(thing, "triangulate"):
-        advice = "triangulate it: mesh.triangulate()"
+        advice = "triangulate the mesh: mesh.triangulate()"
     if getattr(thing, "n_strips", 0):
         raise InputError(asked, f"the mesh has {thing.n_strips} triangle strips", advice)
     try:

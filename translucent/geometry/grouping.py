@@ -328,12 +328,12 @@ def extent(points: Array) -> Array:
 
 
 def _begins(changes: Mask) -> Integers:
-    """Beginnings of groups of sorted elements, from where the next element differs."""
+    """Start indices of groups of equal sorted elements."""
     return np.concatenate([[0], np.flatnonzero(changes) + 1])
 
 
 def _groups(order: Integers, changes: Mask) -> Groups:
-    """Groups of sorted elements, from where the next element differs."""
+    """Group number of each sorted element."""
     begins = np.ones(len(order), dtype=bool)
     begins[1:] = changes
     of = np.empty(len(order), dtype=np.int64)

@@ -77,7 +77,7 @@ class Mesh(Frozen):
         self._settle(copy=True)
 
     def _settle(self, copy: bool) -> None:
-        """Check all that has been given, and keep it as read-only arrays."""
+        """Check all arguments, and store them as read-only arrays."""
         vertices = self._array("vertices", self.vertices, np.float64, 3, copy)
         faces = self._array("faces", self.faces, np.int32, 3, copy)
         if len(faces) == 0:
@@ -240,10 +240,10 @@ class Mesh(Frozen):
             bad = np.flatnonzero(~np.isfinite(self.vertices).all(axis=1))
             return f"{len(bad)} vertices are not finite (first: {bad[0]})", "export the mesh again"
         if largest > MAX_COORDINATE:
-            found = f"a coordinate of {largest:.3g} m, beyond {MAX_COORDINATE:g} m"
-            return found, "give the file's unit (--unit), or scale the mesh"
+            found = f"a coordinate is {largest:.3g} m, beyond the limit of {MAX_COORDINATE:g} m"
+            return found, "state the unit of the file (--unit), or scale the mesh"
         if self.diagonal < MIN_DIAGONAL:
-            return "all its vertices are at one point", "export the mesh again"
+            return "all vertices of the mesh are at one point", "export the mesh again"
         return None
 
 
@@ -272,7 +272,7 @@ def _beyond_indices(array: npt.NDArray[Any]) -> bool:
 
 
 def adopted(vertices: Array, faces: npt.NDArray[np.int32], uv: Array | None, name: str, **others: Any) -> Mesh:
-    """Make a mesh of arrays that nobody else holds, which are checked but not copied."""
+    """Make a mesh that takes ownership of arrays, which are checked but not copied."""
     given = {"uv": uv, "name": name, "repairs": (), "colors": None, "assumed_unit": ""} | others
     mesh = object.__new__(Mesh)
     mesh.__dict__.update(vertices=vertices, faces=faces, **given)
@@ -312,9 +312,9 @@ def mended(raw: Mesh) -> Mesh:
     if (merged := len(used) - len(kept)) > 0:
         repairs.append(f"welded {merged} of {len(raw.vertices)} vertices (within {WELD_TOLERANCE:g} of the diagonal)")
     if flipped:
-        repairs.append(f"turned {flipped} of {len(faces)} faces to agree with their neighbors")
+        repairs.append(f"flipped {flipped} of {len(faces)} faces to match their neighbors")
     if turned:
-        repairs.append(f"turned {turned} closed part{'s' if turned > 1 else ''} outwards")
+        repairs.append(f"flipped {turned} closed part{'s' if turned > 1 else ''} outwards")
     if flipped or turned:
         warnings.warn(
             f"mesh {raw.name!r}: {'; '.join(repairs[-(bool(flipped) + bool(turned)) :])}",

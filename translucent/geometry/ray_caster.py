@@ -1,4 +1,4 @@
-"""The ray caster of the CPU: Embree finds candidate faces in float32, and float64 decides where they are.
+"""Ray caster of the CPU: Embree finds candidate faces in float32, and float64 decides the hits.
 
 Lengths are in radii from the center of what a caster holds, where nothing else is said: float32 is finest there.
 """
@@ -436,7 +436,7 @@ def embree_refusal() -> str:
     except ImportError as error:
         return f"embreex cannot be imported ({error})"
     found = _embreex_version()
-    return "" if _numbers(found) >= _OLDEST else f"embreex is {found}, older than 4.4"
+    return "" if _numbers(found) >= _OLDEST else f"embreex has version {found}, older than 4.4"
 
 
 def _numbers(text: str) -> tuple[int, ...]:

@@ -22,7 +22,7 @@ ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
 def revolve(profile: npt.ArrayLike, segments: int, closed: bool = False) -> tuple[Array, npt.NDArray[np.int32]]:
-    """Surface of revolution of a profile around z; outwards where the solid is on the left of the profile's course.
+    """Surface of revolution of a profile around z; the solid must be on the left of the profile.
 
     Parameters
     ----------

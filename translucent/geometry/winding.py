@@ -351,7 +351,7 @@ def _pairs(triangles: Array, points: Array) -> Iterator[tuple[Integers, Integers
         runs = np.searchsorted(key, strip * (count + 1) + top[triangle]) - first
         ends = np.cumsum(runs)
         if (tests := tests + int(ends[-1])) > MOST_PAIRS:
-            found = f"{count} of them that look inwards lie one in another"
+            found = f"{count} parts with faces that point inwards are nested"
             raise InputError("connected parts of a mesh", found, "remove duplicate faces, or split the mesh")
         for part in np.split(np.arange(len(runs)), np.searchsorted(ends, np.arange(BLOCK, ends[-1], BLOCK))):
             run, place = expanded(first[part], runs[part])

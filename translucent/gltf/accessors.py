@@ -67,7 +67,7 @@ class Accessors:
         """(n,): an accessor of indices, of the type that is stored; raises `InputError` like `vectors`."""
         values, _ = self._elements(index, "SCALAR")
         if values.dtype.kind != "u":
-            raise self.file.refused(f"accessor {index}: indices are no unsigned integers")
+            raise self.file.refused(f"accessor {index}: the indices are not unsigned integers")
         return values[:, 0]
 
     def _elements(self, index: object, kind: str) -> tuple[npt.NDArray[Any], Json]:
@@ -75,7 +75,7 @@ class Accessors:
         values = self.file.item("accessors", index)
         entry = JsonFields(self.file, f"accessor {index}", values)
         if values.get("type") != kind:
-            entry.refuse(f"type {values.get('type')!r} where {kind} belongs")
+            entry.refuse(f"the type is {values.get('type')!r}, but must be {kind}")
         count, dtype = entry.whole("count"), self._dtype(entry)
         if count > MAX_INDEX:
             raise self.file.refused(f"{entry.where} has {count} elements", "split the mesh")
@@ -91,7 +91,7 @@ class Accessors:
     def keep(self, what: str, size: int) -> None:
         """Count the bytes of a mesh that is kept, since many meshes may share one buffer of a small file."""
         self._kept += size
-        self._require_room(f"{what} and what was read before it", self._kept)
+        self._require_room(f"{what}, together with the data before it,", self._kept)
 
     def _require_room(self, what: str, size: int) -> None:
         require_room(f"glTF {str(self.file.path)!r}", what, size, self.file.stored, "split the file")
@@ -109,7 +109,7 @@ class Accessors:
     def _dtype(self, entry: JsonFields) -> np.dtype[Any]:
         code = entry.values.get("componentType")
         if not isinstance(code, int) or code not in COMPONENTS:
-            raise self.file.refused(f"{entry.where}: componentType {code!r} is none of glTF 2.0")
+            raise self.file.refused(f"{entry.where}: componentType {code!r} is not defined in glTF 2.0")
         return np.dtype(COMPONENTS[code])
 
     def _block(self, entry: JsonFields, dtype: np.dtype[Any], count: int, width: int) -> npt.NDArray[Any]:
@@ -121,7 +121,9 @@ class Accessors:
         stride = view.whole("byteStride", element)
         end = offset + stride * (count - 1) + element
         if count < 1 or stride < element or end > length or start + length > len(data):
-            raise self.file.refused(f"{entry.where} leaves its buffer", "copy or export the file again")
+            raise self.file.refused(
+                f"{entry.where} reaches beyond the end of its buffer", "copy or export the file again"
+            )
         return np.ndarray((count, width), dtype, data, start + offset, (stride, dtype.itemsize))
 
 
@@ -153,7 +155,7 @@ def raw_mesh(accessors: Accessors, primitive: Json, name: str, moved: Array | No
     positions = accessors.vectors(attributes.get("POSITION"), "VEC3") if moved is None else moved
     corners = accessors.indices(primitive["indices"]) if "indices" in primitive else np.arange(len(positions))
     if corners.max(initial=0) >= len(positions):
-        found = f"{name!r}: index {corners.max()} points outside the {len(positions)} vertices"
+        found = f"{name!r}: the index {corners.max()} is beyond the last of {len(positions)} vertices"
         raise accessors.file.refused(found)
     count = len(corners) // 3 if mode == _TRIANGLES else len(corners)
     requested, do = f"glTF {str(accessors.file.path)!r}", "close other programs, or decimate the mesh"
@@ -165,7 +167,7 @@ def raw_mesh(accessors: Accessors, primitive: Json, name: str, moved: Array | No
     if "TEXCOORD_0" in attributes:
         uv = accessors.vectors(attributes["TEXCOORD_0"], "VEC2")
         if len(uv) != stored:
-            raise accessors.file.refused(f"{name!r}: {len(uv)} texture coordinates for {stored} vertices")
+            raise accessors.file.refused(f"mesh {name!r} has {len(uv)} texture coordinates, but {stored} vertices")
         uv = np.column_stack([uv[kept, 0], 1.0 - uv[kept, 1]])  # glTF counts v downwards
     colors = None if "COLOR_0" not in attributes else _colors(accessors, attributes["COLOR_0"], stored, name)
     colors = None if colors is None or (colors[kept] == 1).all() else colors[kept]
@@ -191,7 +193,7 @@ def _colors(accessors: Accessors, index: Any, count: int, name: str) -> npt.NDAr
     kind = "VEC3" if accessors.file.item("accessors", index).get("type") == "VEC3" else "VEC4"
     colors = accessors.vectors(index, kind).clip(0.0, 1.0)
     if len(colors) != count:
-        raise accessors.file.refused(f"{name!r}: {len(colors)} colors for {count} vertices")
+        raise accessors.file.refused(f"mesh {name!r} has {len(colors)} colors, but {count} vertices")
     return np.column_stack([colors, np.ones(count)]) if kind == "VEC3" else colors
 
 
@@ -199,12 +201,12 @@ def _faces(accessors: Accessors, mode: Any, corners: AnyIndices, name: str) -> A
     """(m, 3): the faces of a list, strip or fan of triangles."""
     if mode == _TRIANGLES:
         if len(corners) % 3:
-            raise accessors.file.refused(f"{name!r}: {len(corners)} corners make no whole number of triangles")
+            raise accessors.file.refused(f"mesh {name!r} has {len(corners)} corners, which is not a multiple of 3")
         return corners.reshape(-1, 3)
     if mode not in (_STRIP, _FAN):
-        raise accessors.file.refused(f"{name!r}: primitive mode {mode!r} is none of glTF 2.0")
+        raise accessors.file.refused(f"mesh {name!r}: the primitive mode {mode!r} is not defined in glTF 2.0")
     if len(corners) < 3:
-        raise accessors.file.refused(f"{name!r}: {len(corners)} corners make no triangle")
+        raise accessors.file.refused(f"mesh {name!r} has only {len(corners)} corners, too few for a triangle")
     first, second, third = corners[:-2], corners[1:-1], corners[2:]
     if mode == _FAN:
         return np.column_stack([second, third, np.full_like(first, corners[0])])

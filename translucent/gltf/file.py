@@ -70,7 +70,7 @@ class GltfFile:
     _buffers: dict[int, bytes | memoryview] = field(default_factory=dict, init=False, compare=False, repr=False)
 
     def refused(self, found: str, do: str = "export the file again") -> InputError:
-        """Error for a file that cannot be read as what it should be."""
+        """Error for a glTF file with invalid content."""
         return InputError(f"glTF {str(self.path)!r}", found, do)
 
     def items(self, key: str) -> list[Json]:
@@ -84,10 +84,10 @@ class GltfFile:
         return found
 
     def item(self, key: str, index: object) -> Json:
-        """Object of such a list by index; raises `InputError` if there is none."""
+        """Object of a top-level list by index; raises `InputError` if the index is invalid."""
         found = self.items(key)
         if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(found):
-            raise self.refused(f"{key} {index!r} is not one of {len(found)}", "export the file again")
+            raise self.refused(f"{key} {index!r} does not exist: the file has {len(found)}", "export the file again")
         return found[index]
 
     def resource(self, holder: Json) -> bytes:
@@ -97,7 +97,9 @@ class GltfFile:
             whole = self.buffer(view.get("buffer"))
             start, length = view.get("byteOffset", 0), view.get("byteLength", 0)
             if not (isinstance(start, int) and isinstance(length, int) and 0 <= start <= start + length <= len(whole)):
-                raise self.refused("a buffer view leaves its buffer", "copy or export the file again")
+                raise self.refused(
+                    "a buffer view reaches beyond the end of its buffer", "copy or export the file again"
+                )
             return bytes(whole[start : start + length])
         return bytes(self._content(holder))
 
@@ -117,7 +119,7 @@ class GltfFile:
         if isinstance(uri := holder.get("uri"), str):
             return self._linked(uri)
         if len(self.chunks) < CHUNK.size or CHUNK.unpack_from(self.chunks)[1] != BINARY_CHUNK:
-            raise self.refused("it has no binary chunk", "copy or export the file again")
+            raise self.refused("the file has no binary chunk", "copy or export the file again")
         return memoryview(self.chunks)[CHUNK.size : CHUNK.size + CHUNK.unpack_from(self.chunks)[0]]
 
     def _linked(self, uri: str) -> bytes:
@@ -216,12 +218,12 @@ def _split(requested: str, data: bytes) -> tuple[bytes, bytes]:
 
 def _require_short(requested: str, size: int) -> None:
     """Raise `InputError` where a JSON of so many bytes takes too much memory, most of it for data in its links."""
-    do = "save it as .glb, or keep its data in files beside it"
+    do = "save the model as .glb, or keep the data in separate files"
     if size > MAX_JSON:
         raise InputError(
             requested, (f"the JSON of the file has {size_text(size)}, more than the limit of {size_text(MAX_JSON)}"), do
         )
-    require_memory(requested, f"its {size_text(size)} of JSON", 3 * size, do)
+    require_memory(requested, f"{size_text(size)} of JSON", 3 * size, do)
 
 
 def gather(file: GltfFile, tree: Json) -> tuple[Json, bytes]:
@@ -280,7 +282,7 @@ def _content(file: GltfFile, index: int, buffer: Json) -> bytes:
     data, length = file.resource(buffer), buffer.get("byteLength")
     if not (isinstance(length, int) and 0 < length <= len(data)):
         raise file.refused(
-            f"buffer {index} should have {length!r} bytes and has {len(data)}",
+            f"buffer {index} has {len(data)} bytes, but should have {length!r}",
             "copy or export the file again",
         )
     return data[:length]
@@ -318,7 +320,10 @@ def embed_images(file: GltfFile, tree: Json, binary: bytearray) -> None:
         if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
             kind = "image/webp"
         if kind is None:
-            text = f"glTF {str(file.path)!r}: {image['uri']!r} is no picture that glTF knows; it stays a link"
+            text = (
+                f"glTF {str(file.path)!r}: {image['uri']!r} is not a picture of a format that glTF supports; the "
+                "image stays a link"
+            )
             warnings.warn(text, TranslucentWarning, stacklevel=5)
             continue
         _make_view(tree, index, _append(binary, data), len(data), kind)
@@ -339,7 +344,7 @@ def _move(file: GltfFile, old: Json, new: Json, places: dict[int, tuple[int, int
     """Move a buffer view to the new offset of its buffer."""
     index, offset = old.get("buffer"), old.get("byteOffset", 0)
     if not (isinstance(index, int) and index in places and isinstance(offset, int)):
-        raise file.refused(f"a buffer view of buffer {index!r}")
+        raise file.refused(f"a buffer view refers to buffer {index!r}, which does not exist, or has no valid offset")
     new["buffer"], start = places[index]
     if start:
         new["byteOffset"] = start + offset
@@ -431,7 +436,7 @@ def _with_images(file: GltfFile, tree: Json, chunks: bytes) -> tuple[Json, bytes
     end = CHUNK.size + size if kind == BINARY_CHUNK else 0
     binary = bytearray(chunks[CHUNK.size : end])
     if not binary and tree.get("buffers"):
-        text = f"glTF {str(file.path)!r}: its first buffer is a link, so its images stay links, too"
+        text = f"glTF {str(file.path)!r}: the first buffer is a link, so the images also stay links"
         warnings.warn(text, TranslucentWarning, stacklevel=5)
         return tree, chunks
     embed_images(file, tree, binary)
@@ -459,7 +464,7 @@ def label(items: list[Json], index: int) -> str:
 
 
 class JsonFields:
-    """Checked values of one JSON object of a file, each with the default that it has where it is absent.
+    """Checked values of one JSON object of a file, with defaults.
 
     Parameters
     ----------
@@ -481,7 +486,7 @@ class JsonFields:
         self.problems.append(found)
 
     def section(self, key: str) -> JsonFields:
-        """Object in the object; empty if it is absent."""
+        """Nested JSON object; empty if it is absent."""
         found = self.values.get(key, {})
         if not isinstance(found, dict):
             self.refuse(f"{key} is {found!r}, not an object")
@@ -508,7 +513,7 @@ class JsonFields:
             return default
         if not low <= value <= high or (above and value == low):
             allowed = f"above {low:g}" if above else f"{low:g} or more" if math.isinf(high) else f"in {low:g}..{high:g}"
-            self.refuse(f"{key} {value:g} is not {allowed}", "mend the file")
+            self.refuse(f"{key} {value:g} is not {allowed}", "correct the file")
             return default
         return float(value)
 
@@ -538,7 +543,7 @@ class LeftOut:
         self._names: dict[str, dict[str, None]] = {}
 
     def add(self, what: str, name: str) -> None:
-        """Record a loss; the same one again counts once."""
+        """Record a part of the file that is left out; equal entries count once."""
         self._names.setdefault(what, {})[name] = None
 
     def lines(self) -> tuple[str, ...]:

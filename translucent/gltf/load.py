@@ -217,7 +217,7 @@ def check_extensions(file: GltfFile, left_out: LeftOut, known: Collection[str] =
                 continue
             if key == "extensionsRequired" and not name.startswith(_LOOKS):
                 do = "export it without compression" if name in COMPRESSIONS else "export it without this extension"
-                raise file.refused(f"it requires {name}, which is not supported", do)
+                raise file.refused(f"the file requires {name}, which is not supported", do)
             left_out.add("extensions", name)
 
 
@@ -229,7 +229,7 @@ def scene_transforms(file: GltfFile, left_out: LeftOut) -> dict[int, Array]:
     for node, matrix in transforms.items():
         if not (np.abs(matrix) <= MAX_COORDINATE).all():
             where = f"node {label(file.items('nodes'), node)}"
-            raise file.refused(f"{where}: its transform exceeds {MAX_COORDINATE:g}", "export the file again")
+            raise file.refused(f"{where}: the transform has values beyond {MAX_COORDINATE:g}", "export the file again")
     return transforms
 
 
@@ -282,10 +282,10 @@ def read_whole(path: Path, allow_outside: bool = False) -> Triangles:
                 meshes[index] = [raw_mesh(accessors, primitive, f"mesh {index}") for primitive in listed]
             for mesh in filter(None, meshes[index]):
                 size += 4 * (mesh.vertices.nbytes + mesh.faces.nbytes)  # until they are one mesh
-                require_room(f"glTF {str(path)!r}", "its parts in all places", size, file.stored, "split the file")
+                require_room(f"glTF {str(path)!r}", "all placed parts together", size, file.stored, "split the file")
                 parts.append(_placed(mesh, matrix))
     if not parts:
-        raise file.refused("it has no faces", "give a triangle mesh, not points or lines")
+        raise file.refused("the file has no faces", "give a triangle mesh, not points or lines")
     return joined(parts, f"glTF {str(path)!r}")
 
 
@@ -360,8 +360,8 @@ def require_regular(file: GltfFile, where: str, linear: Array) -> None:
     """Raise `InputError` if a transform (3, 3) is singular."""
     if np.linalg.matrix_rank(linear) < 3:
         raise file.refused(
-            f"{where}: its transform is singular (a scale of 0, in it or above it)",
-            "give every axis a scale other than 0",
+            f"{where}: the transform is singular (this node, or a node above, has a scale of 0)",
+            "use a scale other than 0 along every axis",
         )
 
 
@@ -405,9 +405,9 @@ def scene_lights(file: GltfFile, transforms: dict[int, Array], metres: float, le
             continue
         index = placed.get("light")
         if not isinstance(listed, list) or isinstance(index, bool) or not isinstance(index, int):
-            raise file.refused(f"{where}: light {index!r} is not one of its lights")
+            raise file.refused(f"{where}: the light index {index!r} is not a whole number, or the file has no lights")
         if not 0 <= index < len(listed) or not isinstance(listed[index], dict):
-            raise file.refused(f"{where}: light {index} is not one of {len(listed)}")
+            raise file.refused(f"{where}: light {index} does not exist: the file has {len(listed)} lights")
         require_regular(file, where, matrix[:3, :3])
         light = listed[index]
         if "range" in light and light.get("type") != "directional":
@@ -420,10 +420,10 @@ def _light(fields: JsonFields, matrix: Array, metres: float) -> Light:
     color = np.array(fields.numbers("color", (1.0, 1.0, 1.0)))
     strength = fields.number("intensity", 1.0)
     if strength < 0 or (color < 0).any():
-        fields.refuse(f"intensity {strength:g}, color {color.tolist()}: below 0", "mend the file")
+        fields.refuse(f"the intensity {strength:g} or the color {color.tolist()} is below 0", "mend the file")
     kind = fields.values.get("type")
     if kind not in ("point", "directional", "spot"):
-        fields.refuse(f"type {kind!r} is neither point, directional nor spot")
+        fields.refuse(f"the type {kind!r} is not point, directional or spot")
     if kind == "directional":
         return DirectionalLight(-matrix[:3, 2], strength * color)
     position, intensity = matrix[:3, 3] * metres, strength * color * metres**2
@@ -438,6 +438,8 @@ def _cones(spot: JsonFields) -> tuple[float, float]:
     # A right angle of float32 is a little more.
     degrees = math.degrees(inner), min(math.degrees(outer), 90.0) if outer < _RIGHT_ANGLE else math.degrees(outer)
     if not (0.0 <= degrees[0] < degrees[1] <= 90.0 and degrees[1] >= NARROWEST_CONE):
-        found = f"innerConeAngle {inner:g}, outerConeAngle {outer:g}: not 0 <= inner < outer <= pi / 2"
+        found = (
+            f"innerConeAngle is {inner:g} and outerConeAngle is {outer:g}, but 0 <= inner < outer <= pi / 2 must hold"
+        )
         spot.refuse(found, "mend the file")
     return degrees

@@ -162,12 +162,12 @@ def read_draft(extensions: JsonFields, notes: list[str]) -> DraftScattering | No
     color = fields.numbers(_spelling(fields, _COLORS), default, 0.0, 1.0)
     strength = 1.0 if name == VOLUME_SCATTER else fields.number(_spelling(fields, _STRENGTHS), 0.0, 0.0, 1.0)
     if name == SCATTER and not any(key in fields.values for key in _STRENGTHS):
-        notes.append(f"{name} has no scatterStrengthFactor, which is 0 by default: nothing scatters")
+        notes.append(f"{name} has no scatterStrengthFactor; the default is 0, so nothing scatters")
     return DraftScattering(name, color, anisotropy, strength)
 
 
 def draft_extension(medium: Medium, draft: Draft) -> Json:
-    """Extension, by its name, that states how a medium scatters; empty for one that does not."""
+    """Name of the extension that states scattering of the material; empty if there is none."""
     if not medium.scatters:
         return {}
     extinction, scattering = medium.extinction, np.asarray(medium.scattering)
@@ -329,7 +329,7 @@ def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -
         for key in (TRANSMISSION, VOLUME, IOR, EMISSIVE_STRENGTH, DISPERSION, IRIDESCENCE, CLEARCOAT)
     )
     problems += [
-        f"{key} is below pbrMetallicRoughness, where it has no meaning"
+        f"{key} must not be inside pbrMetallicRoughness"
         for key in fields.section("pbrMetallicRoughness").section("extensions").values
         if key.startswith("KHR_materials_")
     ]
@@ -338,7 +338,7 @@ def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -
     index_of_refraction = ior.number("ior", DEFAULT_IOR, 0.0)
     texture, transform = _thickness_texture(volume, len(file.items("textures")))
     if 0 < index_of_refraction < 1:
-        problems.append(f"ior {index_of_refraction:g} is not 0, and not 1 or more")
+        problems.append(f"the ior is {index_of_refraction:g}, but must be 0, or at least 1")
     found = GltfMaterial(
         index=index,
         name=name,
@@ -361,7 +361,7 @@ def _material(file: GltfFile, index: int, entry: Json, draft_extensions: bool) -
         transmits=fraction > 0 or _lets_light_in(extensions),
     )
     if problems:
-        raise file.refused(f"{fields.where}: {', '.join(problems)}", "mend the file")
+        raise file.refused(f"{fields.where}: {', '.join(problems)}", "correct the file")
     return GltfMaterial(**{**vars(found), "warnings": (*_warnings(found, entry, extensions, volume.values), *notes)})
 
 
@@ -373,7 +373,7 @@ def _thickness_texture(volume: JsonFields, count: int) -> tuple[int | None, Text
         return None, TextureTransform()
     index = info.values.get("index")
     if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < count:
-        volume.refuse(f"{key} index {index!r} is not one of {count} textures")
+        volume.refuse(f"{key} has the index {index!r}, but the file has {count} textures")
         return None, TextureTransform()
     return index, texture_transform(info)
 
@@ -391,17 +391,20 @@ def _warnings(found: GltfMaterial, entry: Json, extensions: Json, volume: Json) 
         return []
     notes = [f"{VOLUME} has an unknown property {key!r}" for key in volume if key not in _VOLUME_KEYS]
     if TRANSMISSION not in extensions and not _lets_light_in(extensions):
-        notes.append(f"{VOLUME} without {TRANSMISSION}: no light enters, so it is opaque")
+        notes.append(f"{VOLUME} without {TRANSMISSION}: no light enters, so the material is opaque")
     if entry.get("doubleSided") is True and found.thickness > 0:
-        notes.append("it is double-sided, which a volume should not be")
+        notes.append("the material is double-sided, but a volume should not be")
     notes += [f"{key} excludes {VOLUME}" for key in EXCLUDED if key in extensions]
     black = [c for c, value in zip(("red", "green", "blue"), found.attenuation_color, strict=True) if value == 0]
     if black and math.isfinite(found.attenuation_distance):
-        notes.append(f"attenuationColor {' and '.join(black)} is 0, read as {BLACKEST:g}: no extinction makes black")
+        notes.append(
+            f"attenuationColor {' and '.join(black)} is 0 and was read as {BLACKEST:g}, because 0 would "
+            "need an infinite extinction"
+        )
     if found.ior == 0:
-        notes.append(f"ior is 0, read as {DEFAULT_IOR:g}")
+        notes.append(f"ior is 0 and was read as {DEFAULT_IOR:g}")
     if found.thickness == 0 and math.isfinite(found.attenuation_distance):
-        notes.append("thicknessFactor is 0, so it is a thin wall and attenuation has no effect")
+        notes.append("thicknessFactor is 0: the material is a thin wall, and its attenuation has no effect")
     texture = volume.get("thicknessTexture")
     for key in texture.get("extensions", {}) if isinstance(texture, dict) else ():
         if key != TEXTURE_TRANSFORM:

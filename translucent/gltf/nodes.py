@@ -59,7 +59,7 @@ def node_transforms(file: GltfFile) -> dict[int, Array]:
         transforms[index] = above @ _local(file, index, nodes[index])
         pending += [(child, transforms[index]) for child in _indices(file, nodes[index])]
     if len(transforms) < len(nodes):
-        raise file.refused("nodes are their own parents")
+        raise file.refused("some nodes are their own ancestors")
     return transforms
 
 
@@ -141,7 +141,7 @@ def variant_materials(file: GltfFile, primitive: Json) -> list[int]:
 def _indices(file: GltfFile, node: Json) -> list[int]:
     found = node.get("children", [])
     if not isinstance(found, list):
-        raise file.refused(f"children {found!r}")
+        raise file.refused(f"the children of a node are {found!r}, not a list")
     for index in found:
         file.item("nodes", index)
     return found
@@ -183,7 +183,7 @@ def thickness_map(file: GltfFile, material: GltfMaterial) -> Array | None:
         return None
     texture = file.item("textures", material.thickness_texture)
     data = file.resource(file.item("images", texture.get("source")))
-    requested = f"glTF {str(file.path)!r}: its thickness texture"
+    requested = f"glTF {str(file.path)!r}, thickness texture"
     try:
         with open_picture(data, requested, ("PNG", "JPEG"), per_pixel=40, do="export the file again") as image:
             # Pillow reads 16-bit gray as it is, and 16-bit RGB as 8-bit.
@@ -271,16 +271,18 @@ def posed(file: GltfFile, seconds: float, left_out: LeftOut) -> GltfFile:
                 continue
             file.item("nodes", node)
             if "matrix" in moved[node] and path != "weights":
-                raise file.refused(f"animation {name} moves node {label(moved, node)}, which has a matrix")
+                raise file.refused(
+                    f"animation {name} moves node {label(moved, node)}, but a node with a matrix cannot be animated"
+                )
             if (node, path) in taken:
-                left_out.add(f"animations that move what another does ({path})", name)
+                left_out.add(f"animations of a property that another animation moves ({path})", name)
                 continue
             taken.add((node, path))
             value, end = _value(file, accessors, animation, channel, path, seconds, name)
             moved[node][path] = value.tolist()
             ends.append(end)
     if ends and seconds > max(ends):
-        text = f"its animations end after {max(ends):g} s; at {seconds:g} s all stays as it is then"
+        text = f"the animations end after {max(ends):g} s; the pose at {seconds:g} s is the last pose"
         warnings.warn(f"scene {file.path.name!r}: {text}", TranslucentWarning, stacklevel=4)
     return dataclasses.replace(file, tree={**file.tree, "nodes": moved})
 
@@ -303,26 +305,28 @@ def _value(
     """Value of a channel, and the time of its last key."""
     samplers, index = animation.get("samplers", []), channel.get("sampler")
     if not isinstance(samplers, list) or not isinstance(index, int) or not 0 <= index < len(samplers):
-        raise file.refused(f"animation {name}: sampler {index!r} is not one of its samplers")
+        raise file.refused(f"animation {name}: the animation has no sampler {index!r}")
     sampler = samplers[index]
     if not isinstance(sampler, dict) or (mode := sampler.get("interpolation", "LINEAR")) not in _MODES:
-        raise file.refused(f"animation {name}: sampler {index} is no object with an interpolation of glTF 2.0")
+        raise file.refused(f"animation {name}: sampler {index} has no interpolation that glTF 2.0 defines")
     times = accessors.vectors(sampler.get("input"), "SCALAR")[:, 0]
     values = accessors.vectors(sampler.get("output"), _KINDS[path])
     per_key = 3 if mode == "CUBICSPLINE" else 1
     if path == "weights" and len(times) and len(values) % (per_key * len(times)) == 0:
         values = values.reshape(per_key * len(times), -1)  # of all targets at a key
     if len(values) != per_key * len(times) or not (np.isfinite(times).all() and np.isfinite(values).all()):
-        raise file.refused(f"animation {name}: {len(values)} values for {len(times)} keys, or one that is not finite")
+        raise file.refused(
+            f"animation {name}: {len(values)} values for {len(times)} keys, or a value that is not finite"
+        )
     if (np.diff(times) <= 0).any():
-        raise file.refused(f"animation {name}: its keys are not in the order of time")
+        raise file.refused(f"animation {name}: the keys are not in ascending order of time")
     found = sampled_channel(times, values.reshape(len(times), per_key, -1), seconds, mode, arc=path == "rotation")
     end = float(times[-1])
     if path != "rotation":
         return found, end
     length = float(np.linalg.norm(found))
     if not length > 0:
-        raise file.refused(f"animation {name}: a rotation of length 0")
+        raise file.refused(f"animation {name}: a rotation has the length 0")
     return found / length, end
 
 

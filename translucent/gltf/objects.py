@@ -97,8 +97,8 @@ _CLEAR = Medium()
 
 #: Message about alphaMode BLEND.
 BLENDED = (
-    "alphaMode BLEND, drawn as thin sheets that cover a share of what is behind, sorted by object as in viewers; they "
-    "cast no shadows, and rays that bend do not meet them"
+    "alphaMode BLEND: partly transparent layers, sorted by object as in viewers, without shadows, and not visible "
+    "to refracted rays"
 )
 
 #: Smallest fraction of metal in a texture that is not taken for noise.
@@ -160,7 +160,7 @@ VERTEX_COLORED = SceneMaterial((1.0, 1.0, 1.0), surface=Surface(roughness=1.0, i
 def material_reader(
     file: GltfFile, metres: float, left_out: LeftOut, draft_extensions: bool = False
 ) -> Callable[[int | None], SceneMaterial]:
-    """Function from the index of a material to what it is in a scene, each read once; None is the index of none.
+    """Function from a material index to the material of the scene, each read once; None is the default material.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ class _Reader:
         self.diffuse = self.fields.extension(DIFFUSE_TRANSMISSION)
         self.alpha_mode = entry.get("alphaMode", "OPAQUE")
         if self.alpha_mode not in ("OPAQUE", "MASK", "BLEND"):
-            self.fields.refuse(f"alphaMode {self.alpha_mode!r} is none of glTF 2.0")
+            self.fields.refuse(f"alphaMode {self.alpha_mode!r} is not defined in glTF 2.0")
         self.alpha_cutoff = self.fields.number("alphaCutoff", 0.5, 0.0) if self.alpha_mode == "MASK" else 0.0
 
     def read(self, metres: float) -> SceneMaterial:
@@ -329,12 +329,12 @@ def scene_objects(
     for mesh, index, place in _placed_meshes(file, transforms, left_out, variant_index(file, variant)):
         material, surface = _fitted(material_of(index), mesh, left_out)
         if material.hidden:
-            left_out.add("objects hidden by their alpha", repr(mesh.name))
+            left_out.add("objects with an alpha of 0", repr(mesh.name))
             continue
         objects.append(Object(mesh, None, scale @ place, color=material.color, surface=surface))
         materials.append(material)
     if not objects:
-        raise file.refused("its scene has no triangles", "give a file with a mesh")
+        raise file.refused("the scene of the file has no triangles", "give a file with a mesh")
     boxes = np.stack([item.bounds for item in objects])
     diagonal = float(np.linalg.norm(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)))
     wall = max(WALL_SHARE * diagonal, MIN_DIAGONAL)
@@ -357,7 +357,7 @@ def _fitted(material: SceneMaterial, mesh: Mesh, left_out: LeftOut) -> tuple[Sce
         material = _blended(material, surface, mesh, left_out)
     if material.medium is not None and not material.hidden:
         if surface.alpha_cutoff > _alpha(surface, mesh):
-            what = "holes of solids by alphaMode MASK, drawn closed (a solid with a hole has no inside)"
+            what = "alphaMode MASK on solids: the holes are drawn closed, because a solid with holes has no inside"
             left_out.add(what, material.name)
         surface = dataclasses.replace(surface, alpha_cutoff=0.0)
     # A metallicFactor alone decides nothing, since its default is 1 for glass, too.
@@ -413,7 +413,7 @@ def _placed_meshes(
         place = np.eye(4) if deformer.skins(nodes[node]) else transforms[node]
         if not place[:3, :3].any():
             # "This provides a mechanism to animate visibility" (glTF 2.0, section on transformations).
-            left_out.add("objects hidden by a scale of 0", label(nodes, node))
+            left_out.add("objects with a scale of 0", label(nodes, node))
             continue
         for i, primitive in enumerate(listed := primitives(file, entry)):
             moves = deformer.moves(nodes[node], primitive)
@@ -440,7 +440,7 @@ def _mesh_name(node: Json, entry: Json, index: int, *, shared: bool) -> str:
 
 
 class Deformer:
-    """Deformer of the meshes of a file, with the nodes of the file as they stand.
+    """Deformer of meshes by skins and morph targets, for the current pose of the nodes.
 
     Parameters
     ----------
@@ -476,20 +476,22 @@ class Deformer:
 
     def _morphed(self, positions: Array, targets: object, weights: object) -> Array:
         if not (isinstance(targets, list) and all(isinstance(one, dict) for one in targets)):
-            raise self._file.refused("a primitive's targets are not a list of objects")
+            raise self._file.refused("the morph targets of a primitive are not a list of objects")
         given = [0.0] * len(targets) if weights is None else weights
         try:
             numbers = np.array(given, dtype=np.float64)
         except (TypeError, ValueError):
             numbers = np.zeros(0)
         if numbers.shape != (len(targets),) or not np.isfinite(numbers).all():
-            raise self._file.refused(f"weights {given!r} for {len(targets)} morph targets")
+            raise self._file.refused(f"the weights are {given!r}, but the mesh has {len(targets)} morph targets")
         moved = positions.copy()
         for weight, target in zip(numbers.tolist(), targets, strict=True):
             if weight and "POSITION" in target:
                 offsets = self._accessors.vectors(target["POSITION"], "VEC3")
                 if offsets.shape != positions.shape:
-                    raise self._file.refused(f"a morph target has {len(offsets)} positions for {len(positions)}")
+                    raise self._file.refused(
+                        f"a morph target has {len(offsets)} positions, but the mesh has {len(positions)}"
+                    )
                 moved += weight * offsets
         return moved
 
@@ -502,9 +504,11 @@ class Deformer:
             joints = self._accessors.vectors(attributes[f"JOINTS_{number}"], "VEC4").astype(np.int64)
             weights = self._accessors.vectors(attributes.get(f"WEIGHTS_{number}"), "VEC4")
             if len(joints) != len(positions) or weights.shape != joints.shape:
-                raise self._file.refused(f"joints or weights {number} are not as many as the vertices")
+                raise self._file.refused(f"JOINTS_{number} or WEIGHTS_{number} has another length than the vertices")
             if joints.min(initial=0) < 0 or (joints[weights != 0] >= len(matrices)).any():
-                raise self._file.refused(f"skin {index}: a vertex has a joint that is none of its {len(matrices)}")
+                raise self._file.refused(
+                    f"skin {index}: a vertex refers to a joint beyond the {len(matrices)} joints of the skin"
+                )
             for joint, weight in zip(joints.T, weights.T, strict=True):
                 blended += weight[:, None, None] * matrices[np.minimum(joint, len(matrices) - 1)]
                 total += weight

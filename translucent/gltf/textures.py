@@ -150,14 +150,14 @@ class Textures:
         info = JsonFields(self._file, where, holder).section(key)
         entry, transform = self._file.item("textures", info.values.get("index")), texture_transform(info)
         if transform.tex_coord != 0:
-            self._left_out.add(f"textures over TEXCOORD_{transform.tex_coord}", name)
+            self._left_out.add(f"textures with TEXCOORD_{transform.tex_coord}", name)
             return None
         if "source" not in entry:
             self._left_out.add("textures that are neither PNG nor JPEG", name)
             return None
         sampler = self._file.item("samplers", entry["sampler"]) if "sampler" in entry else {}
         if sampler.get("magFilter") == NEAREST:
-            self._left_out.add("nearest-neighbor filters of textures, drawn smooth", name)
+            self._left_out.add("nearest-neighbor filtering of textures (drawn smooth)", name)
         wraps = tuple(self._wrap(where, sampler, axis) for axis in ("wrapS", "wrapT"))
         made = (entry["source"], srgb, normal_scale, strength, wraps, transform)
         if (picture := self._picture(entry["source"], name)) is None:
@@ -172,7 +172,7 @@ class Textures:
     def _wrap(self, where: str, sampler: Json, axis: str) -> str:
         code = sampler.get(axis, 10497)
         if not isinstance(code, int) or code not in _WRAPS:
-            raise self._file.refused(f"{where}: {axis} {code!r} is none of glTF 2.0")
+            raise self._file.refused(f"{where}: the value {code!r} of {axis} is not defined in glTF 2.0")
         return _WRAPS[code]
 
     def _picture(self, index: int, name: str) -> Bytes | None:
@@ -199,7 +199,7 @@ class Textures:
         if (image := self._decoded(where, data)) is None:
             return None
         if max(image.size) > MAX_SIDE:
-            self._left_out.add(f"pixels of textures beyond {MAX_SIDE} along a side", name)
+            self._left_out.add(f"full resolution of textures larger than {MAX_SIDE} pixels along a side", name)
             image.thumbnail((MAX_SIDE, MAX_SIDE), Image.Resampling.BOX)
         return np.asarray(image)
 

@@ -38,7 +38,7 @@ from translucent.media.medium import Medium, color_at
 
 
 def volume_extensions(medium: Medium, distance: float | None, thickness: float, ior: float) -> Json:
-    """Material extensions that hold this medium.
+    """glTF material extensions for this medium.
 
     Parameters
     ----------
@@ -158,23 +158,23 @@ def write_media(
     used += [name for name in (TRANSMISSION, VOLUME, IOR, *DRAFTS.values()) if name in stated and name not in used]
     media = [filling.medium for filling in fillings]
     if any(medium.emits or (medium.scatters and draft_extensions is None) for medium in media):
-        lost = "glTF holds absorption only: scattering is written as extinction, emission is lost"
+        lost = "glTF stores only absorption: scattering is written as absorption, and emission is left out"
         if draft_extensions is not None:
-            lost = "glTF holds no emission of volumes: it is lost"
+            lost = "glTF cannot store emission of volumes: emission is left out"
         warnings.warn(lost, TranslucentWarning, stacklevel=4)
     write_gltf(edited, path_out)
     return sorted(held)
 
 
 def _own_materials(file: GltfFile, object_name: str | None, entered: set[int]) -> dict[int, list[float]]:
-    """Indices of the materials of the named objects and of them alone, each with the sizes of its objects.
+    """Indices of materials used only by the named objects, each with the sizes of its objects.
 
     Without a name: materials that light enters, or all of them where it enters none.
     """
     meshes = file.items("meshes")
     mine = set(range(len(meshes))) if object_name is None else _meshes_named(file, object_name)
     if not mine:
-        raise file.refused("it has no mesh", "give a model with a mesh")
+        raise file.refused("the file has no mesh", "give a model with a mesh")
     used = {primitive.get("material") for index in mine for primitive in primitives(file, meshes[index])}
     chosen = used & entered if object_name is None else set()
     every = [(index, primitive) for index, mesh in enumerate(meshes) for primitive in primitives(file, mesh)]
@@ -240,7 +240,7 @@ def _smallest_side(file: GltfFile, primitive: Json) -> float:
     try:
         return min(float(high) - float(low) for low, high in zip(accessor["min"], accessor["max"], strict=True))
     except (KeyError, TypeError, ValueError) as error:
-        raise file.refused("positions without min and max") from error
+        raise file.refused("the positions have no min and max") from error
 
 
 def _fill(file: GltfFile, index: int, filling: Filling, sizes: list[float]) -> None:
@@ -274,7 +274,7 @@ def _fill(file: GltfFile, index: int, filling: Filling, sizes: list[float]) -> N
 
 
 def _state_scattering(file: GltfFile, index: int, medium: Medium, draft: Draft) -> None:
-    """State in one material how the medium scatters, by a draft of an extension alone."""
+    """Write scattering into a material, by a draft extension."""
     material = file.item("materials", index)
     extensions, made = material["extensions"], draft_extension(medium, draft)
     if SCATTER in made and DIFFUSE_TRANSMISSION in extensions:

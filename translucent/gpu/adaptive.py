@@ -50,7 +50,8 @@ Run = Callable[[tuple[PassName, ...]], None]
 
 
 class AdaptiveSampling:
-    """Averages over samples in two rounds: what is cheap for every sample, then rays from interfaces where it matters.
+    """Averages over samples in two rounds: first the cheap passes for all samples, then ray tracing where pixels need
+    it.
 
     Of n samples at low-discrepancy points the error is about sigma / n, with the standard deviation sigma of a sample.
     A picture with the error that N samples of each pixel leave takes least time if a pixel has samples in proportion to
@@ -194,7 +195,7 @@ class AdaptiveSampling:
 
 
 def wanted_samples(deviations: Floats, samples: int) -> float:
-    """Samples of a pixel whose deviation is 1 where a picture has the error that so many of each pixel leave.
+    """Number of samples that a pixel of standard deviation 1 needs to reach the error of a picture.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""OpenGL contexts: the one place that opens them, and records what it tried.
+"""Creation of OpenGL contexts, and a record of the platforms that were tried.
 
 Without a window system that is Mesa's off-screen library, through ctypes: the system's libOSMesa, or the one in the
 Python package that the extra ``osmesa`` installs.
@@ -132,8 +132,8 @@ def require_interfaces(info: Mapping[str, Any]) -> None:
     """
     if str(info["GL_RENDERER"]).startswith("zink (llvmpipe") and "Mesa 22." in str(info["GL_VERSION"]):
         raise DriverFaultError(
-            "interfaces of bodies, or surfaces of opaque objects in lights, with zink over lavapipe",
-            f"this driver, {info['GL_VERSION']}, ends the process on them",
+            "interfaces, or lit opaque surfaces, with the driver zink over lavapipe",
+            f"this driver, {info['GL_VERSION']}, crashes on them",
             "use another driver, a newer Mesa, or objects without ior and surface",
         )
 
@@ -144,7 +144,7 @@ _QUICK = "GALLIVM_PERF", "nopt"
 
 @contextmanager
 def quick_compiles(quick: bool) -> Iterator[None]:
-    """Have an OpenGL that is opened meanwhile compile in half the time: the same picture, drawn a fifth slower.
+    """Let OpenGL contexts opened within compile shaders faster, with slower drawing and equal results.
 
     Mesa's software rasterizer does, where it is the first of its process, and the variable is not set otherwise.
     """
@@ -165,7 +165,7 @@ _INDEX, _ROOM = 8 + (20 << 16), 1 << 24
 
 
 def avoid_full_cache() -> None:
-    """Leave out Mesa's cache of compiled shaders in this process, with a warning, where the disk has no room for it.
+    """Disable Mesa's shader cache in this process, with a warning, if its disk is full.
 
     To be called before OpenGL is opened. Some builds of Mesa map an index that has no blocks on the disk yet, and
     a write to it ends the process by SIGBUS where the disk, or the user's quota, is full.
@@ -181,9 +181,9 @@ def avoid_full_cache() -> None:
             if error.errno not in (errno.ENOSPC, errno.EDQUOT):
                 continue
             os.environ[off] = "true"
-            found = f"no room in {str(folder)!r} ({error.strerror})"
-            do = "free some, or set MESA_SHADER_CACHE_DIR: shaders are not kept, so that each process compiles its own"
-            warnings.warn(f"Mesa's cache of shaders; {found}; {do}", TranslucentWarning, stacklevel=2)
+            found = f"the disk of {str(folder)!r} is full ({error.strerror})"
+            do = "free some space, or set MESA_SHADER_CACHE_DIR; until then, each process compiles all shaders anew"
+            warnings.warn(f"Mesa's shader cache is not used; {found}; {do}", TranslucentWarning, stacklevel=2)
             return
 
 
@@ -256,7 +256,7 @@ class NoContextError(RenderError):
         tried = "; ".join(f"{attempt.backend}: {attempt.error}" for attempt in attempts)
         super().__init__(
             "OpenGL 3.3 context",
-            f"none; tried {tried}",
+            f"no context could be created (tried {tried})",
             "apt-get install libegl1 libgl1 libgl1-mesa-dri, or pip install --no-deps lavavu-osmesa (Linux x86-64); "
             "`translucent doctor` explains this machine",
         )

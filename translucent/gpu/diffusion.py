@@ -159,7 +159,7 @@ class DiffusionCache:
         self._solver(plan.diffusion).of(plan)
 
     def keep(self, plan: RenderPlan, fields: Fields) -> None:
-        """Keep the light of a plan that was found elsewhere. Needs no context, either."""
+        """Store the light of a plan, computed elsewhere. Needs no context, either."""
         self._solver(plan.diffusion).keep(plan, fields)
 
     def release(self) -> None:
@@ -221,7 +221,7 @@ class GridTexture:
         limit = int(self._gl.info["GL_MAX_3D_TEXTURE_SIZE"])
         try:
             if max(layers.shape) > limit:
-                raise moderngl.Error(f"a 3D texture ends at {limit}")
+                raise moderngl.Error(f"3D textures are limited to {limit} texels along a side")
             texture = self._gl.texture3d((width, height, depth), 1, layers, alignment=1, dtype="f4")
         except moderngl.Error as error:
             raise RenderError(

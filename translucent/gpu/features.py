@@ -44,7 +44,7 @@ class FrameFeatures:
 
     @property
     def has_shadow_maps(self) -> bool:
-        """True if opaque objects look up what reaches them of lights."""
+        """True if opaque objects need shadow maps."""
         return self.plan.has(PassName.SHADOW_MAPS)
 
     @property
@@ -74,7 +74,7 @@ class FrameFeatures:
 
     @property
     def has_unlit(self) -> bool:
-        """True if pixels are marked invalid where bodies scatter light that is not followed."""
+        """True if pixels of scattering bodies are marked invalid, because their light cannot be computed."""
         return self._fills("unlit")
 
     @property
@@ -94,7 +94,7 @@ class FrameFeatures:
 
     @property
     def stopping_slots(self) -> int:
-        """A bit for each slot that stops the straight light of the lights into media, where photons carry it on."""
+        """Bit mask of the slots whose straight light is stopped, because photons carry it."""
         stops = self.plan.opaque_to_shadows if self.scatters_again else frozenset()
         return sum(1 << i for i, slot in enumerate(self.slots) if stops.intersection(slot.objects))
 
@@ -137,12 +137,12 @@ class FrameFeatures:
 
     @property
     def dims_interfaces(self) -> bool:
-        """True if rays find what bodies keep of the lights on interfaces, in highlights and diffuse reflection."""
+        """True if shadow rays dim highlights and diffuse reflection on interfaces."""
         return (self.traced or self.path_traced) and dims_interfaces(self.scene)
 
     @property
     def path_traced(self) -> bool:
-        """True if radiance is that of random paths."""
+        """True if radiance is path traced."""
         return self.plan.has(PassName.PATH_TRACE)
 
     @property

@@ -1,4 +1,4 @@
-"""Hierarchies on the GPU: those of the meshes of a scene, and one of its objects, as textures that rays walk through.
+"""Bounding volume hierarchies on the GPU: one per mesh and one over all objects, stored in textures.
 
 One 16-byte texel is a node: six bounds of 16 bits, and a link. Triangles lie in the order of the leaves, three texels
 each, with the corners' smooth normals as 2 x 16 bits on an octahedron (Cigolle et al. 2014). Packing needs no OpenGL:
@@ -249,7 +249,7 @@ class SceneHierarchies:
         self._placed: tuple[Hashable, tuple[Fields, ...], tuple[float, float, float, float]] | None = None
 
     def place(self, scene: Scene, center: Array) -> tuple[tuple[Fields, ...], tuple[float, float, float, float]]:
-        """Write the hierarchy of objects where they are.
+        """Write the hierarchy of objects at their current transforms.
 
         Returns
         -------
@@ -384,9 +384,9 @@ def _check_texels(gl: moderngl.Context, texels: int) -> None:
     """Raise `RenderError` if a texture of this OpenGL does not hold so many texels."""
     limit = int(gl.info["GL_MAX_TEXTURE_SIZE"])
     if limit < _WIDTH:
-        found, do = f"this OpenGL's textures end at {limit} texels a side, and hierarchies take {_WIDTH}", ""
+        found, do = f"this OpenGL allows {limit} texels along a side, but ray tracing needs {_WIDTH}", ""
     elif texels > (room := min(limit, _MOST_ROWS) * _WIDTH):
-        found, do = f"at least {texels:,} texels, and this OpenGL holds {room:,}", ", or coarser meshes"
+        found, do = f"this needs at least {texels:,} texels, but this OpenGL allows {room:,}", ", or coarser meshes"
     else:
         return
     raise RenderError("ray tracing through the meshes", found, f"use interfaces=tl.ScreenInterfaces(){do}")
@@ -394,7 +394,7 @@ def _check_texels(gl: moderngl.Context, texels: int) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """Texels from a place on; links in them are raised: those of nodes, and those of leaves."""
+    """Texels at an offset, whose node and leaf links are shifted."""
 
     first: int
     texels: Words
@@ -402,7 +402,7 @@ class _Piece:
 
 
 def _rows(pieces: Sequence[_Piece], begin: int, end: int) -> Words:
-    """Texels from one place to another, 0 where there is none of the pieces."""
+    """Texels of a range of rows, filled with 0 between the pieces."""
     found = np.zeros((end - begin, 4), np.uint32)
     for piece in pieces:
         low, high = max(piece.first, begin), min(piece.first + len(piece.texels), end)

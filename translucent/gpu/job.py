@@ -141,7 +141,7 @@ class UniformBuffers:
         self._constant[block] = self._gl.buffer(content)
 
     def bind(self) -> None:
-        """Bind these uniforms, where others have been bound since they were placed."""
+        """Bind these uniforms again after others were bound."""
         self._view.bind_to_uniform_block(VIEW.binding)
         for block, buffer in self._constant.items():
             buffer.bind_to_uniform_block(block.binding)
@@ -365,7 +365,7 @@ class FrameJob(CameraView):
 
     @property
     def compact_result(self) -> moderngl.Framebuffer:
-        """Target of what is compact; with optical depth where that is not the same multiple of thickness everywhere."""
+        """Target of the compact result, with optical depth only if it is not proportional to thickness."""
         return self.targets.compact(with_depth=self.plan.spectral)
 
     def sums_after(self, name: str) -> bool:

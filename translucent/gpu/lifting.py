@@ -276,7 +276,7 @@ def find_shader(name: str) -> str:
     if found:
         raise InputError(f"shader {name!r}", "several shader files have this name", f"use one of {', '.join(found)}")
     close = close_names(name, known) or close_names(name, dict.fromkeys(stems.values()))
-    do = did_you_mean(close) if close else "'translucent shader' lists all"
+    do = did_you_mean(close) if close else "'translucent shader' lists all shaders"
     raise InputError(f"shader {name!r}", "no shader has this name", do)
 
 
@@ -307,7 +307,7 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
         raise InputError(f"target {target!r}", "no target has this name", f"use one of {', '.join(get_args(Dialect))}")
     gathered = gather(name)
     if unknown := sorted(defines.keys() - gathered.switches):
-        known = ", ".join(sorted(gathered.switches)) or "it has none"
+        known = ", ".join(sorted(gathered.switches)) or "(none)"
         raise InputError(
             f"shader {name!r}",
             f"the shader has no switch {', '.join(unknown)}",
@@ -425,7 +425,7 @@ def _evaluated(node: ast.expr, defines: Mapping[str, int]) -> int:
         case ast.Compare(left=left, ops=[op], comparators=[right]):
             a, b = _evaluated(left, defines), _evaluated(right, defines)
             return {ast.Eq: a == b, ast.NotEq: a != b, ast.Lt: a < b, ast.Gt: a > b}[type(op)]
-    raise ValueError(f"no condition of whole numbers: {ast.unparse(node)}")
+    raise ValueError(f"this is not a condition on whole numbers: {ast.unparse(node)}")
 
 
 def _parts(lines: Iterable[tuple[int, str]]) -> Iterator[_Part]:

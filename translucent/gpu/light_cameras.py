@@ -1,4 +1,4 @@
-"""Cameras that look from the lights of a scene, and keys by which views from lights are kept while these see the same.
+"""Cameras at the lights of a scene, and cache keys of the views from lights.
 
 Lists of crossings (`LightViewsPass`) and maps of shadows (`ShadowMapsPass`) have views of their own: lists fit the
 media, where their texels count, and maps all that throws shadows, large as it may be.
@@ -108,7 +108,7 @@ def _any_up(direction: Array) -> Array:
 
 
 def light_key(light: Light) -> tuple[object, ...]:
-    """Key of where a light is, and where it shines."""
+    """Key of the position and direction of a light."""
     if isinstance(light, DirectionalLight):
         return DirectionalLight, np.asarray(light.direction).tobytes()
     # The view of a spot is no wider than its cone.
@@ -191,7 +191,7 @@ class _Supports:
         self.count = 0
 
     def add(self, support: Support) -> None:
-        """Add that of an object."""
+        """Add the bounds of an object."""
         number = len(self._small) + len(self._many)
         if support.many:
             self._many.append((number, support))

@@ -67,7 +67,7 @@ class PassTimer:
         return {name: before + self._elapsed(name) for name, before in self._seconds.items()}
 
     def _elapsed(self, name: str) -> float:
-        """Seconds that a query has measured last: as moderngl reads them, or all 64 bits where that is too few."""
+        """Seconds that a query measured last, read with 64 bits if 32 are too few."""
         nanoseconds = self._queries[name].elapsed
         return 1e-9 * (nanoseconds if nanoseconds < _SATURATED else self._all_bits(name))
 
@@ -77,7 +77,7 @@ class PassTimer:
         return result.value
 
     def _number(self, query: moderngl.Query) -> int:
-        """Number of a query, which moderngl keeps to itself, and OpenGL knows of the one that runs."""
+        """OpenGL name of a timer query, which moderngl does not expose."""
         number = ctypes.c_int()
         query.mglo.begin()
         self._get_query(_TIME_ELAPSED, _CURRENT_QUERY, ctypes.byref(number))
@@ -140,15 +140,15 @@ class FrameTraffic:
     def __str__(self) -> str:
         counted = [step for step in self.passes if step.pixel is not None]
         rest = [step.name.value for step in self.passes if step.pixel is None]
-        lines = ["bytes in targets at most, of one sample:"]
+        lines = ["largest number of bytes read and written in render targets, for one sample:"]
         for step in counted:
             assert step.pixel is not None
-            face = f" and {_words(*step.face)} for each face over it" if any(step.face) else ""
+            face = f" and {_words(*step.face)} for each face over the pixel" if any(step.face) else ""
             lines.append(f"  {step.name}: {_words(*step.pixel)} per pixel{face}")
         read, written = (sum(step.pixel[i] for step in counted if step.pixel is not None) for i in range(2))
         lines.append(f"  together: {_words(read, written)} per pixel, and {self.read_back} read back")
         if rest:
-            lines.append(f"  not counted, since it depends on what rays hit: {', '.join(rest)}")
+            lines.append(f"  not counted, because it depends on the rays: {', '.join(rest)}")
         return "\n".join(lines)
 
 

@@ -32,7 +32,7 @@ class AxialRange:
 
     @classmethod
     def of_boxes(cls, boxes: Array, camera: Camera) -> AxialRange:
-        """The same of what has these bounds (n, 2, 3)."""
+        """Extents in the picture of boxes with these bounds (n, 2, 3)."""
         depths = _corners(boxes - camera.eye) @ camera.forward
         near = max(float(depths.min()), 0.0)
         # A flat scene has one depth; any length will do.

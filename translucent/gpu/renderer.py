@@ -407,7 +407,7 @@ class GpuRenderer:
 
     def _require_open(self) -> None:
         if self._closed or self._interrupted:
-            how = "it was interrupted" if self._interrupted and not self._closed else "the renderer is closed"
+            how = "the renderer was interrupted" if self._interrupted and not self._closed else "the renderer is closed"
             raise RenderError("rendering", how, "create a new renderer")
 
     def step(self, kind: type[Pass]) -> Pass:

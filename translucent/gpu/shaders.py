@@ -34,7 +34,7 @@ class PostponedError(Exception):
     """
 
     def __init__(self, program: ProgramName | None) -> None:
-        super().__init__("the frame has made enough for now" if program is None else f"{program} has to wait")
+        super().__init__("the frame has compiled enough shaders" if program is None else (f"{program} must wait"))
         self.program = program
 
 
@@ -64,7 +64,7 @@ class CompileBudget:
         self._until, self._made = time.perf_counter() + seconds, False
 
     def leave_room(self) -> None:
-        """Raise `PostponedError` if what the frame has made has taken its compile budget: the next one draws."""
+        """Raise `PostponedError` if the frame has used up its compile budget."""
         if self.postpones and self._made and time.perf_counter() > self._until:
             raise PostponedError(None)
 
@@ -155,7 +155,7 @@ def preprocess(name: str, defines: Mapping[str, int] | None = None, version: int
 
 
 def _with_switches(name: str, gathered: Gathered, defines: Mapping[str, int] | None, version: int) -> ShaderSource:
-    """Text of what was gathered, as `preprocess` gives it."""
+    """Preprocessed text of gathered shader files."""
     body = "\n".join(gathered.lines)
     given = dict(defines or {})
     if unknown := sorted(given.keys() - gathered.switches):
@@ -340,7 +340,7 @@ def set_uniform(program: moderngl.Program | moderngl.ComputeShader, name: str, v
 
 
 def set_used(program: moderngl.Program | moderngl.ComputeShader, values: Mapping[str, Any]) -> None:
-    """Set those of these loose uniforms that the program has: variants of a shader use some of them each."""
+    """Set these loose uniforms where the program has them."""
     for name, value in values.items():
         if (uniform := program.get(name, None)) is not None:  # `in` goes through all names
             uniform.value = value

@@ -1,4 +1,4 @@
-"""Picture that stands in for a better one: bodies in one color each, by a small program that compiles at once.
+"""Quick preview picture: bodies in one color each, by a small program that compiles at once.
 
 A material that is chosen for the first time may need programs that a driver compiles for many seconds. This picture
 needs none of them, no normals and no solution for scattered light: see ``shaders/present/stand_in.frag``.
@@ -33,7 +33,7 @@ COAT = 0.04
 
 
 class StandIn:
-    """Programs of pictures that stand in.
+    """Programs of quick preview pictures.
 
     Parameters
     ----------

@@ -132,7 +132,7 @@ class Storage:
             del self._buffers[name]
         try:
             if size > self.largest:
-                raise moderngl.Error(f"a shader reaches {self.largest / 1e6:.0f} MB")
+                raise moderngl.Error(f"a shader can read at most {self.largest / 1e6:.0f} MB")
             self._buffers[name] = self._gl.buffer(reserve=size)
         except moderngl.Error as error:
             raise RenderError(
@@ -163,7 +163,7 @@ Size = tuple[int, int]
 
 
 class Targets:
-    """Framebuffers of one frame size, by what they hold, and buffers for the lists of its pixels."""
+    """Framebuffers of one frame size by their contents, and buffers for the lists of its pixels."""
 
     def __init__(self, gl: moderngl.Context, size: Size) -> None:
         limit = int(gl.info["GL_MAX_TEXTURE_SIZE"])

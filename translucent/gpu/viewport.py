@@ -68,7 +68,7 @@ class Side:
             self.all = gl.framebuffer(self.textures)
             self.light = gl.framebuffer(self.textures[:1])
         except moderngl.Error as error:
-            found = f"OpenGL has no room for it ({error})"
+            found = f"OpenGL does not have enough memory ({error})"
             raise RenderError(f"viewport of {size[0]}x{size[1]}", found, "make the window smaller") from error
         self.step, self.stride = 0, 1
 
@@ -84,7 +84,7 @@ class Side:
         return [tuple(found[i : i + 4]) for i in range(0, len(found), 4)]
 
     def kept(self, x: int, y: int) -> Size:
-        """Position at which pixel (x, y) is kept, once all of them are drawn."""
+        """Storage position of pixel (x, y) in the finished picture."""
         part = self.size[0] // self.stride, self.size[1] // self.stride
         return x % self.stride * part[0] + x // self.stride, y % self.stride * part[1] + y // self.stride
 
@@ -213,14 +213,14 @@ class Viewport:
         self._coarse, self._at_once, self._standing = made, True, False
 
     def prepare_stand_in(self, scene: Scene, tones: Iterable[str]) -> None:
-        """Have the driver compile what `stand_in` needs, by the bodies of a scene."""
+        """Compile the programs of `stand_in` in advance."""
         standing = self._standing
         for tone in tones:
             self.stand_in(scene, (0.0, tone), whole=False)
         self._standing = standing
 
     def stand_in(self, scene: Scene, look: tuple[float, str], *, whole: bool) -> None:
-        """Show a picture that stands in for one of a scene until there is one; needs no program that takes long.
+        """Show a quick preview picture of a scene, without slow programs.
 
         Parameters
         ----------
@@ -273,7 +273,7 @@ class Viewport:
             texture.filter = moderngl.NEAREST, moderngl.NEAREST
             screen = self._gl.framebuffer([texture])
         except moderngl.Error as error:
-            found = f"OpenGL has no room for it ({error})"
+            found = f"OpenGL does not have enough memory ({error})"
             raise RenderError(f"viewport of {size[0]}x{size[1]}", found, "make the window smaller") from error
         screen.clear()
         if self._screen is not None:
@@ -494,7 +494,7 @@ class Viewport:
         return side
 
     def _make_ready(self, job: FrameJob, side: Side, *, first: bool) -> None:
-        """Have the driver compile what adds samples, which takes as long as a step: a window has a frame for it."""
+        """Compile in advance the programs that add samples."""
         if first not in self._added:
             before_making(self._gl)
             into = side.all if first else side.light

@@ -125,7 +125,7 @@ def translucent_nodes(scene: Any, names: Collection[str]) -> list[tuple[Any, str
     nodes = sorted((node for node in scene.mesh_nodes if node.mesh.is_visible), key=_order)
     known = {name for node in nodes for name in (node.name, node.mesh.name) if name is not None}
     if unknown := sorted(set(names) - known):
-        listed = ", ".join(map(repr, sorted(known))) or "no names: give nodes some, scene.add(mesh, name=...)"
+        listed = ", ".join(map(repr, sorted(known))) or "no names: use scene.add(mesh, name=...)"
         raise InputError(
             f"media for {', '.join(map(repr, unknown))}",
             f"no visible node or mesh of the pyrender scene has this name; the scene has {listed}",
@@ -447,7 +447,7 @@ def why_not_in(context: GpuContext) -> str | None:
         if OpenGL.platform.GetCurrentContext() and GL.glGenVertexArrays:
             return None
     bound = type(OpenGL.platform.PLATFORM).__name__
-    return f"PyOpenGL is bound to {bound} since it was imported, and the renderer's context is {context.backend!r}"
+    return f"PyOpenGL is bound to {bound}, but the context of the renderer is {context.backend!r}"
 
 
 @contextmanager

@@ -127,7 +127,7 @@ def to_mitsuba(
         If Mitsuba is not installed, or no variant of it is set; `write_mitsuba` needs neither.
     """
     described, files = describe(scene, size, samples)
-    without = "or write a file, for which it need not be here: tl.write_mitsuba(scene, size, 'scene.xml')"
+    without = "or write a file without Mitsuba: tl.write_mitsuba(scene, size, 'scene.xml')"
     try:
         mitsuba: Any = import_module("mitsuba")
     except ImportError:
@@ -204,7 +204,7 @@ def check_output(path: Path) -> None:
 
 
 def _element(value: Described, name: str | None, files: Mapping[str, str]) -> ElementTree.Element:
-    """XML of a plugin, with what is within it."""
+    """XML of a plugin and its children."""
     element = ElementTree.Element(_ELEMENTS[value["type"]], type=value["type"])
     if name is not None:
         element.set("name", name)
@@ -229,7 +229,7 @@ def _element(value: Described, name: str | None, files: Mapping[str, str]) -> El
 
 
 def describe(scene: Scene, size: tuple[int, int], samples: int = SAMPLES) -> tuple[Described, dict[str, Any]]:
-    """Describe a scene in plugins of Mitsuba, with lists as matrices; and its files, by name, with what writes them.
+    """Describe a scene by Mitsuba plugins, and its files by name, each with its writer.
 
     Raises
     ------
@@ -244,7 +244,7 @@ def describe(scene: Scene, size: tuple[int, int], samples: int = SAMPLES) -> tup
         raise InputError("a scene for Mitsuba", found, do)
     rough = [body for body in scene.bodies if body.surface is not None and body.surface.roughness > ROUGH]
     if rough:
-        text = "Mitsuba's rough dielectrics have no scattering among facets: there they are darker than here"
+        text = "Mitsuba renders rough dielectrics darker, without multiple scattering between microfacets"
         warnings.warn(f"{object_names(rough)}: {text}", TranslucentWarning, stacklevel=3)
     scale = units_per_metre(scene)
     described: Described = {
@@ -414,28 +414,28 @@ def _beyond(scene: Scene) -> Iterator[tuple[str, str]]:
     groups = (
         (
             [body for body in scene.bodies if body.density is not None],
-            "densities that vary, which are formulas here and grids of voxels there",
-            "give them one density, or take tl.reference.path_trace for a truth",
+            "a varying density cannot be written for Mitsuba",
+            "use a constant density, or tl.reference.path_trace for a reference picture",
         ),
         (
             [body for body in scene.bodies if body.sheet_thickness is not None],
-            "sheets, which have no inside to fill",
-            "model their thickness, or leave them out",
+            "thin-walled sheets have no inside for a medium",
+            "model the thickness of the sheets, or omit them",
         ),
         (
             [scene.objects[i] for i in open_bodies(scene)],
-            "bodies that are not closed, so that a ray does not know what it is in",
-            "close them",
+            "the mesh is not closed, so the medium of a ray is not known",
+            "close the meshes",
         ),
         (
             [body for body in scene.bodies if body.medium is not None and body.medium.emits],
-            "media that emit",
-            "leave the emission out",
+            "Mitsuba cannot render this emission",
+            "omit the emission",
         ),
         (
             [body for body in scene.bodies if body.medium is not None and body.medium.phase is not None],
-            "phase functions other than Henyey and Greenstein's",
-            "give the medium an anisotropy in place of its phase",
+            "only the Henyey-Greenstein phase function can be written",
+            "use the parameter anisotropy instead of phase",
         ),
     )
     for items, found, do in groups:
@@ -443,33 +443,36 @@ def _beyond(scene: Scene) -> Iterator[tuple[str, str]]:
             yield f"{object_names(items)}: {found}", do
     for item in scene.objects:
         if said := _beyond_surface(item):
-            do = "take a ground of one color" if item.shadow_catcher else "leave it out of the surface"
+            do = "use a ground of one color" if item.shadow_catcher else "omit this property"
             more = ", or no stage" if item.shadow_catcher else ""
-            yield f"{item.mesh.name!r}: {said} of its surface", do + more
+            yield f"{item.mesh.name!r}: its surface has {said}, which cannot be written", do + more
     if (pair := overlapping_pair(solids)) is not None:
         names = object_names([solids[i] for i in pair])
-        found = f"{names}: bodies that may overlap, for which it has neither sums nor priorities"
-        yield found, "move them apart, or give each interface one medium on each side by hand"
+        found = f"{names}: these bodies may overlap, and Mitsuba has no rule for overlaps"
+        yield found, "move the bodies apart"
     for light in scene.lights:
         if not isinstance(light, (PointLight, DirectionalLight, SphereLight)):
             kind = (
-                "spot lights, whose cones fall off otherwise" if isinstance(light, SpotLight) else type(light).__name__
+                "Mitsuba's spot lights have another falloff" if isinstance(light, SpotLight) else type(light).__name__
             )
             yield kind, "use a tl.PointLight"
     if np.asarray(scene.ambient).any():
-        yield "ambient radiance, which stands for light that its paths find", "leave ambient out"
+        yield "ambient radiance stands for light that path tracing finds itself", "omit ambient"
     if scene.environment.kind == "checkerboard":
-        yield "a checkerboard, which is fixed to the picture", "use tl.Environment.image or gradient"
+        yield (
+            "the checkerboard environment belongs to the picture, not to directions",
+            "use tl.Environment.image or gradient",
+        )
     if scene.environment.background is not None:
-        yield "an environment that is seen otherwise than it lights", "leave its background out"
+        yield "the visible background differs from the environment that lights the scene", "omit the background"
     if scene.camera.window is not None:
-        yield "a part of a larger picture", "take the camera of the whole picture"
+        yield "the camera shows only a part of a larger picture", "use the camera of the whole picture"
     if scene.camera.fov_y is not None and any(abs(body.winding_number(scene.camera.eye)) > 0.5 for body in solids):
-        yield "a camera inside of a body", "move it out"
+        yield "the camera is inside a body", "move the camera outside"
 
 
 def _beyond_surface(item: Object) -> str:
-    """Properties of a surface for which Mitsuba's interfaces and diffuse surfaces have no words, listed."""
+    """Properties of a surface that cannot be written for Mitsuba, listed."""
     if (surface := item.surface) is None:
         return "colors of vertices" if item.mesh.colors is not None else ""
     default = Surface()
@@ -480,7 +483,7 @@ def _beyond_surface(item: Object) -> str:
         names += ["diffuse_transmission", "metallic", "alpha_cutoff"]
     found = [name for name in names if getattr(surface, name) != getattr(default, name)]
     if item.medium is None and surface.ior != 1.0:
-        found.append("the coat of ior")
+        found.append("a coat with an ior")
     if item.medium is not None and not np.array_equal(surface.color, default.color):
         found.append("color")
     if surface.glows:
@@ -488,7 +491,7 @@ def _beyond_surface(item: Object) -> str:
     held = [name for name in TEXTURE_FIELDS if getattr(surface, name) is not None]
     if item.medium is None and held == ["color_texture"] and surface.color_texture is not None:
         if len(set(surface.color_texture.wrap)) > 1:
-            found.append("a texture that repeats in one direction alone")
+            found.append("a texture that repeats along only one axis")
     elif held:
         found.append("textures")
     if item.mesh.colors is not None:

@@ -167,7 +167,7 @@ def scene_from_pyrender(
 
 
 def backdrop_from_pyrender(scene: Any, translucent: Collection[str], size: tuple[int, int], flags: int = 0) -> Backdrop:
-    """Everything else of a pyrender scene as a picture, drawn by pyrender in an OpenGL context of its own.
+    """Opaque part of a pyrender scene as a picture, drawn by pyrender in its own OpenGL context.
 
     Parameters
     ----------
@@ -346,7 +346,7 @@ def render_scene(
             return render_scene(scene, size, method, samples, made, scattering)
     _require_opaque(scene)
     context = renderer.gpu.context
-    _require_copying("its opaque objects always come so", owned=context.owned, shared=None)
+    _require_copying("this picture needs a copy", owned=context.owned, shared=None)
     pyrender = load_pyrender(context.backend)
     from translucent.interop._pyrender_bridge import drawn_apart, written
 

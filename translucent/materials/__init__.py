@@ -1,4 +1,4 @@
-"""Media written for other systems, and read from their files, each with its formula, its source and what it loses.
+"""Conversion of media to and from other systems, each with its formula, its source and its losses.
 
 `TARGETS` names the systems that `text_block` writes for; `load_medium` reads their files. Numbers of
 the others: `translucent.materials.blender` and `translucent.materials.engines`. Each text that is written can be saved
@@ -121,7 +121,7 @@ def load_medium(path: str | Path, unit: str = "m") -> Medium:
     what, reader = f"material {str(path)!r}", _target_of(path)
     if reader is None or reader.read is None:
         suffixes = dict.fromkeys(target.suffix for target in TARGETS.values() if target.suffix)
-        do = f"give a {', '.join(suffixes)} file; of glTF, translucent material show tells the colors"
+        do = f"give a {', '.join(suffixes)} file; for glTF, see translucent material show"
         raise InputError(what, f"suffix {Path(path).suffix!r}", do)
     text = read_text(path, what)
     try:

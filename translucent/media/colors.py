@@ -175,7 +175,7 @@ def _pixel(image: Image, x: int, y: int) -> Array:
 ColorLike = str | npt.ArrayLike
 
 #: Advice about a color that a shell has dropped.
-QUOTE_HINT = "a shell takes #... for a comment: quote it, '#7b1e3a', or leave the # out"
+QUOTE_HINT = "in a shell, quote the color: '#7b1e3a' (# begins a comment)"
 
 _BARE_HEX = re.compile(r"\s*[0-9a-fA-F]{6}\s*")
 _FUNCTION = re.compile(r"\s*(srgb|linear)\s*\(([^()]*)\)\s*", re.IGNORECASE)
@@ -243,7 +243,7 @@ def _parse_text(text: str) -> Array:
         rgb = ImageColor.getrgb(f"#{text.strip()}" if _BARE_HEX.fullmatch(text) else text.strip())
     except ValueError:
         if (eight := _BYTES.fullmatch(text)) is not None:
-            found = "three numbers of 0 to 255"
+            found = "these are three numbers from 0 to 255"
             raise InputError(f"color {text!r}", found, f"write {hex_of_bytes(map(float, eight.groups()))!r}") from None
         raise InputError(
             f"color {text!r}",

@@ -249,9 +249,9 @@ def doubts(color: npt.ArrayLike, distance: float) -> tuple[str, ...]:
         lines.append(f"the distance {distance:g} m is outside {low:g} to {high:g} m; check the unit")
     near, far = (color_at_distance(extinction_from_colors(t, 1.0), factor) for factor in (FACTORS[0], FACTORS[-1]))
     if near.max() < 0.01:
-        lines.append("nearly black at a tenth of the distance already; check the unit, or give a lighter color")
+        lines.append("nearly black even at a tenth of the distance; check the unit, or use a lighter color")
     if far.min() > 0.9 and t.min() < 1:
-        lines.append("nearly clear even at ten times the distance; check the unit, or give a darker color")
+        lines.append("nearly clear even at ten times the distance; check the unit, or use a darker color")
     return tuple(lines)
 
 
@@ -295,13 +295,15 @@ def _finite_or_none(values: Array) -> list[float | None]:
 
 def _channel_doubt(name: str, value: float) -> str | None:
     if value == 1:
-        return f"{name} is 1 (saturated): exactly no extinction, at any distance; if it was clipped, lower it"
+        return f"{name} is 1, so the medium absorbs nothing of it; if the value was clipped, use a lower one"
     if value > NEAR_WHITE:
         # Next to white, a step of 1/255 in sRGB is one of 2.4 / 1.055 / 255 = 0.9 % in the linear value.
         percent = 100 * 0.5 * 2.4 / 1.055 / 255 * float(condition_number(value))
-        return f"{name} {value:g} is near white: rounding it to 8 bits changes its extinction by up to {percent:.0f} %"
+        return f"{name} {value:g} is near white: rounding to 8 bits changes the extinction by up to {percent:.0f} %"
     if value < NEAR_BLACK:
-        return f"{name} {value:g} is near black: 8 bits hardly distinguish it from 0, which no finite extinction gives"
+        return (
+            f"{name} {value:g} is near black: 8 bits hardly distinguish it from 0, which needs an infinite extinction"
+        )
     return None
 
 

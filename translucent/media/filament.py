@@ -77,7 +77,7 @@ def td_of(extinction: npt.ArrayLike, transmittance: float = TD_TRANSMITTANCE) ->
 
 def _fraction(transmittance: float) -> float:
     if not 0 < transmittance < 1:
-        do = "give the share of light that is left after one TD, for example 0.1"
+        do = "give the fraction of light that is left after one TD, for example 0.1"
         raise InputError(
             f"transmission distance at a transmittance of {transmittance!r}",
             "the transmittance must lie between 0 and 1",

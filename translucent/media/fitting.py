@@ -169,9 +169,11 @@ def fit_steps(photographs: Sequence[PatchTransmittances], ior: float | None = No
     slopes = [_slope(samples) for samples in channels]
     if min(slopes) < 0 and max(slopes) <= 0:
         which = [name for name, slope in zip(CHANNELS, slopes, strict=True) if slope < 0]
-        who = "every channel is" if len(which) == 3 else f"{' and '.join(which)} {'is' if len(which) == 1 else 'are'}"
+        who = (
+            "all channels become" if len(which) == 3 else f"{' and '.join(which)} {'is' if len(which) == 1 else 'are'}"
+        )
         rest = "" if len(which) == 3 else ", and no channel is darker"
-        do = "give thicknesses in their order from the left of a patch, or from its top where that is the longer side"
+        do = "list the thicknesses from left to right, or from top to bottom in an upright patch"
         raise InputError(
             "fit to photographs", f"{who} brighter where the plate is thicker, which is physically impossible{rest}", do
         )
@@ -179,7 +181,7 @@ def fit_steps(photographs: Sequence[PatchTransmittances], ior: float | None = No
     sigma, error, interval, loss, chi2, samples = (np.array(row) for row in list(zip(*found, strict=True))[:6])
     warnings = [line for one in found for line in one[6]]
     warnings += [
-        f"{name} brightens with thickness; its extinction is 0"
+        f"{name} brightens with thickness, so its extinction is set to 0"
         for name, value in zip(CHANNELS, sigma, strict=True)
         if value < 0
     ]
@@ -189,7 +191,7 @@ def fit_steps(photographs: Sequence[PatchTransmittances], ior: float | None = No
 
 
 def _slope(samples: _ChannelSamples) -> int:
-    """-1 where light clearly grows with thickness, whatever the faces keep back, 1 where it clearly falls, else 0."""
+    """-1 where light clearly grows with thickness, 1 where it clearly falls, else 0."""
     if len(np.unique(samples.thickness)) < 2:
         return 0
     line = samples.line(1, fixed=False)
@@ -239,13 +241,13 @@ def _channel(photographs: Sequence[PatchTransmittances], channel: int, ior: floa
 
 
 def _reflected(ior: float) -> float:
-    """Share that both faces of a clear slab reflect: 2 R / (1 + R)."""
+    """Fraction of light that both faces of a clear slab reflect: 2 R / (1 + R)."""
     r = _reflectance(ior)
     return 2.0 * r / (1.0 + r)
 
 
 def _reflectance(ior: float) -> float:
-    """Share that one face reflects of light straight on (Fresnel)."""
+    """Fraction of perpendicular light that one face reflects (Fresnel)."""
     return ((ior - 1.0) / (ior + 1.0)) ** 2
 
 
@@ -265,8 +267,8 @@ def _few(steps: int, ior: float | None) -> str:
     if ior is not None:
         return "one thickness cannot show whether light falls off exponentially; photograph more thicknesses"
     if steps == 1:
-        return "one thickness: the reflection of its faces (8 % at ior 1.5) counts as absorbed; give its ior, or more"
-    return "two thicknesses cannot show whether light falls off exponentially; photograph a third"
+        return "with one thickness, reflection (8 % at ior 1.5) counts as absorption; state the ior, or photograph more"
+    return "two thicknesses cannot show whether light falls off exponentially; photograph three"
 
 
 def _bent(samples: _ChannelSamples, fixed: bool, channel: int, slope: float) -> list[str]:
@@ -280,9 +282,9 @@ def _bent(samples: _ChannelSamples, fixed: bool, channel: int, slope: float) -> 
     if abs(curve.best[0]) <= limit * curve.scale * curve.errors[0] or abs(change) <= BEND * abs(slope):
         return []
     why = (
-        "less than exponentially, as if light is scattered many times or strays into the lens"
+        "less than exponentially, as with multiple scattering or stray light in the lens"
         if change < 0
-        else "more than exponentially, as if dark values are cut off or thicknesses are wrong"
+        else "more than exponentially, as with clipped dark values or wrong thicknesses"
     )
     return [f"{CHANNELS[channel]} falls off {why}: the extinction is right only near the photographed thicknesses"]
 
@@ -305,8 +307,8 @@ def _disagreeing(
     ends = [photographs[usable[i]].name for i in (int(slopes.argmin()), int(slopes.argmax()))]
     percent = 100.0 * spread / max(abs(slope), 1e-300)
     return [
-        f"{CHANNELS[channel]} differs by {percent:.0f} % between {ends[0]} and {ends[1]}: "
-        "is a camera's tone curve in them? Develop raw files without one, or save linear .exr"
+        f"{CHANNELS[channel]} differs by {percent:.0f} % between {ends[0]} and {ends[1]}, perhaps by the tone curve "
+        "of the camera: develop raw files without a tone curve, or save linear .exr"
     ]
 
 

@@ -161,7 +161,7 @@ class Preset:
 
     @property
     def slab_reflectance(self) -> Array:
-        """(2, 3, 3): what slabs of 1, 5 and 20 mm on a white and a black card (`CARDS`) send back of white light.
+        """(2, 3, 3): reflected color of slabs of 1, 5 and 20 mm on a white and a black card (`CARDS`) in white light.
 
         From all sides to all sides, polished, without the mirror image, the card below in optical contact: as on
         a contrast chart. Exact where scattering is isotropic; else by the reduced coefficients; of thick
@@ -399,7 +399,7 @@ class _Entry:
         given = set(self.entry)
         for key in sorted(given - _KNOWN):
             close = get_close_matches(key, sorted(_KNOWN), n=1)
-            do = f"did you mean {close[0]!r}?" if close else f"use some of {', '.join(sorted(_KNOWN))}"
+            do = f"did you mean {close[0]!r}?" if close else f"use one of {', '.join(sorted(_KNOWN))}"
             raise InputError(self.where, f"unknown key {key!r}", do)
         if given & _BY_COLOR:
             self._check_by_color(given)
@@ -413,7 +413,7 @@ class _Entry:
     def _check_by_color(self, given: set[str]) -> None:
         self._exclude(given & {"absorption"}, "color")
         for key in sorted(given & _UNREDUCED):
-            do = "give 'reduced_scattering', sigma_s (1 - g), in its place"
+            do = "give 'reduced_scattering', sigma_s (1 - g), instead"
             raise InputError(self.where, f"the key {key!r} cannot be combined with 'color'", do)
         per_length = bool(given & {"reduced_scattering", "emission"})
         if "unit" in given and not per_length:
@@ -586,7 +586,7 @@ def read_table(path: str | Path, *, needs: Iterable[tuple[str, ...]]) -> list[Ro
         If the file cannot be read, holds no row, or lacks a column.
     """
     what = f"table {str(path)!r}"
-    text = read_text(path, what, do="save it as CSV or JSON, in UTF-8")
+    text = read_text(path, what, do="save the table as CSV or JSON, in UTF-8")
     rows = _json_rows(what, path, text) if Path(path).suffix.lower() == ".json" else _csv_rows(path, text, needs)
     if not rows:
         raise InputError(what, "the table has no rows", "add at least one row")
@@ -601,7 +601,7 @@ def _csv_rows(path: str | Path, text: str, needs: Iterable[tuple[str, ...]]) -> 
         for choice in needs:
             if not set(choice) & set(names):
                 found = f"no column {' or '.join(repr(name) for name in choice)}"
-                has = f"its first line says {', '.join(names)}" if names else "it is empty"
+                has = f"the first line is {', '.join(names)}" if names else "the file is empty"
                 raise InputError(what, f"{found}: {has}", "write the names of the columns into the first line")
         for line in reader:
             cells = [cell.strip() for cell in line]

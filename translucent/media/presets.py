@@ -170,11 +170,11 @@ def preset(name: str) -> Preset:
     close = close_names(key, [*_all(), *own]) or close_names(key, known) or speaking
     number = len(_all())
     do = (
-        f"{did_you_mean(close)} 'translucent presets' lists all {number}"
+        f"{did_you_mean(close)} 'translucent presets' lists all {number} presets"
         if close
         else f"use one of {', '.join(_WELL_KNOWN)} and {number - len(_WELL_KNOWN)} more, see 'translucent presets'"
     )
-    unread = f"; your own are not all read: {wrong[0]}" if wrong else ""
+    unread = f"; one of your own presets could not be read: {wrong[0]}" if wrong else ""
     raise InputError(f"preset {name!r}", "no preset has this name", f"{do}{unread}")
 
 
@@ -194,7 +194,7 @@ def _words(one: Preset) -> list[str]:
 
 
 def _is_about(error: InputError, key: str) -> bool:
-    """True where an own preset of this name is wrong: an entry, or the file called so."""
+    """True if the error concerns a user preset of this name."""
     return re.search(rf"\[{key}\]|[/\\]{key}\.toml'", str(error)) is not None
 
 
@@ -318,5 +318,5 @@ def _record(row: Row, unit: str, unit_out: str, clamp: bool) -> tuple[dict[str, 
     medium = Medium.from_color(kept, distance)
     found = summary(kept, distance, medium.extinction, unit_out)
     if changed:
-        found["warnings"].insert(0, f"color clamped to {CLAMP:g} where it was below")
+        found["warnings"].insert(0, f"channels of the color below {CLAMP:g} were set to {CLAMP:g}")
     return {"name": name, **found}, changed

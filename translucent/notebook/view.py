@@ -50,13 +50,13 @@ def _bundle(scene: Scene) -> Bundle:
     sizes = dict.fromkeys(size_note(item.mesh, way="argument") for item in scene.shown)
     lines = [repr(scene), *_contents(scene), *filter(None, sizes), _view(scene)]
     if why := _takes_long(scene):
-        lines.append(f"Not drawn here, since {why}: renderer.render(scene, size) does.")
+        lines.append(f"No picture, because {why}; use renderer.render(scene, size).")
         return bundle([], lines, "\n".join(lines))
     began = time.perf_counter()
     try:
         frame = _renderer().render(scene, SIZE, samples=SAMPLES)
     except TranslucentError as error:
-        lines.append(f"Not drawn here: {error}")
+        lines.append(f"No picture: {error}")
         return bundle([], lines, "\n".join(lines))
     took = time.perf_counter() - began
     drawn = f"{SIZE[0]} x {SIZE[1]} pixels, {SAMPLES} sample, drawn in {took:.1f} s by {frame.provenance['backend']}"
@@ -73,7 +73,7 @@ def _renderer() -> Renderer:
 
 
 def _takes_long(scene: Scene) -> str:
-    """Reason why a scene is not drawn unasked; nothing if it is."""
+    """Reason why a scene is not drawn automatically; empty if it is drawn."""
     faces = sum(len(item.mesh.faces) for item in scene.objects)
     if faces > MANY_TRIANGLES:
         return f"it has {faces / 1e6:.1f} million triangles"

@@ -219,10 +219,10 @@ class SceneView(Widget):  # type: ignore[misc]
             return name
         found = named_preset(name)
         if found.medium.scatters or found.medium.emits:
-            do = "render it: dataclasses.replace an object's medium, or tl.showcase(mesh, tl.preset(...).medium)"
+            do = "show a new scene: tl.showcase(mesh, tl.preset(...).medium)"
             raise InputError(
                 f"preset {name!r} in a view",
-                "this preset scatters or emits light, and a view can only change media that absorb",
+                "this preset scatters or emits light, but a view supports only media that absorb",
                 do,
             )
         self._check_editable()
@@ -232,7 +232,7 @@ class SceneView(Widget):  # type: ignore[misc]
         """Raise `InputError` if the viewer cannot change the shown medium."""
         why = "" if self._quiet else next(filter(None, map(editable, self._bodies[self.medium])), "")
         if why:
-            raise InputError(f"medium {self.medium} of a view", why, "render another scene to see another medium")
+            raise InputError(f"medium {self.medium} of a view", why, "show a new scene with another medium")
 
 
 def _users(scene: Scene) -> list[list[Object]]:

@@ -206,20 +206,20 @@ def fixed_albedo(plan: RenderPlan) -> str:
     bodies = [item for item in plan.scene.objects if treatment_of(item) is Treatment.DIFFUSION]
     media = {scatterer_of(item) for item in bodies}
     if not bodies or plan.treated(Treatment.VOLUME) or any(item.density is not None for item in bodies):
-        return "it is no even medium behind an interface"
+        return "the medium has no interface or a varying density"
     if len(media) > 1:
-        return "there are several such media"
+        return "the scene has several scattering media"
     albedo, medium = _albedo_of(plan)
     if any(
         item.medium is not None and item not in bodies and scatterer_of(item) == medium for item in plan.scene.objects
     ):
-        return "light does not diffuse in all bodies of it"
+        return "not all bodies of this medium use diffusion"
     if albedo.min() < SOLVED[0]:
-        return "it hardly scatters in one of its channels"
+        return "the medium hardly scatters one color channel"
     if medium.emits:
-        return "it glows"
+        return "the medium emits light"
     inside = [item for item in plan.scene.opaque if any(_contains(body.bounds, item.bounds) for body in bodies)]
-    return "opaque objects are inside" if inside else ""
+    return "opaque objects are inside the medium" if inside else ""
 
 
 def _contains(outer: Array, inner: Array) -> bool:

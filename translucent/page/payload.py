@@ -158,7 +158,7 @@ def _add_albedos(
     into: Container,
     frames: Mapping[str, tuple[Scene, RecordedFrame]],
 ) -> None:
-    """Add light of the scattering medium at other albedos, and why that of media without it stays."""
+    """Add the light of the scattering medium for other albedos, or the reason why its color is fixed."""
     texture = recorder.resources.diffusion.of(planned.plan)
     if texture is None:
         return
@@ -172,8 +172,8 @@ def _add_albedos(
         entry = header["scene"]["media"][header["scene"]["objects"][i]["medium"]]
         if light is not None and i in light.surfaces:
             entry["has_albedo"] = True
-        elif "Its color" not in entry["why"]:
-            entry["why"] += f" Its color stays, too: {fixed or 'light does not diffuse in it'}."
+        elif "The color" not in entry["why"]:
+            entry["why"] += f" The color cannot change either, because {fixed or 'the medium does not use diffusion'}."
     if light is not None:
         header["albedos"] = {
             **light.entry(into, texture.first_layers, texture.ground_layer),

@@ -59,7 +59,7 @@ def _coarse(mesh: Mesh, faces: int) -> Mesh:
     try:
         import fast_simplification
     except ImportError as error:
-        do = "pip install fast-simplification, or reduce the model before, for example in Blender"
+        do = "pip install fast-simplification, or reduce the model first, for example in Blender"
         raise InputError("--simplify", "the Python package fast-simplification is not installed", do) from error
     # It asks for arrays that it could write to; more haste than this makes bodies thinner, by several percent.
     points, triangles = np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32)
@@ -78,13 +78,13 @@ def editable(body: Object) -> str:
         return "opaque"
     if np.any(np.asarray(medium.scattering) > 0):
         return (
-            "This medium scatters light. How that spreads was solved for when the page was written: "
-            "density, index and roughness stay. For another one, write the page again."
+            "This medium scatters light, and its light was computed when the page was written: density, index of "
+            "refraction and roughness cannot change here."
         )
     if medium.emits:
-        return "This medium glows: it stays as it is."
+        return "This medium emits light, so it cannot change here."
     if body.density is not None:
-        return "The density of this medium varies: it stays as it is."
+        return "The density of this medium varies, so it cannot change here."
     return ""
 
 
@@ -128,7 +128,7 @@ MOST_LAYERS = 16
 _NOT_SHOWN = {
     PassName.FRAGMENT_LISTS: "lists of fragments",
     PassName.K_BUFFER: "a k-buffer",
-    PassName.LIGHT_VIEWS: "light that is scattered into the rays",
+    PassName.LIGHT_VIEWS: "light that is scattered into rays",
     PassName.PATH_TRACE: "random paths",
     PassName.CAUSTICS: "photons",
 }
@@ -159,12 +159,12 @@ class PagePlan:
     given: Scene | None = None
 
     def given_body(self, body: Object) -> Object:
-        """A body of the scene as it was given."""
+        """Original body of the scene, before changes for the page."""
         return body if self.given is None else self.given.objects[list(self.scene.objects).index(body)]
 
     @property
     def unlit(self) -> tuple[Object, ...]:
-        """Bodies as they were given, whose scattered light the page leaves out."""
+        """Original bodies whose scattered light the page leaves out."""
         given = (self.given_body(body) for body in self.scene.objects)
         return tuple(one for one, body in zip(given, self.scene.objects, strict=True) if one is not body)
 
@@ -181,19 +181,19 @@ class PagePlan:
             media = [body.medium for body in self.unlit if body.medium is not None]
             most = max(float(_albedo(medium).max()) for medium in media)
             text = (
-                f"light that is scattered in {object_names(self.unlit)}: up to {most:.0%} of what a ray loses there; "
-                "thickness and transmittance are exact"
+                f"{object_names(self.unlit)}: scattered light is missing, up to {most:.0%} of the light that a ray "
+                "loses there; thickness and transmittance are exact"
             )
             found.append(Note(NoteKind.UNLIT, text))
         if (count := triangles(self.scene)) > MANY_TRIANGLES:
-            text = f"{count:,} triangles load and turn slowly in a browser: --simplify 300000 shows a coarser copy"
+            text = f"{count:,} triangles are slow in a browser; --simplify 300000 writes a coarser copy"
             found.append(Note(NoteKind.MANY_TRIANGLES, text))
         if any(body.density is not None for body in self.scene.objects):
             found.append(
                 Note(NoteKind.STEPS, "media of varying density: the panel of the page cannot change these media")
             )
         if sum(body.covers for body in self.scene.objects) > 1:
-            text = "layers are put over each other in the order in which the first camera sees them"
+            text = "partly transparent layers are sorted once, for the first camera"
             found.append(Note(NoteKind.LAYERS, text))
         return tuple(found)
 
@@ -241,7 +241,7 @@ def plan_page(scene: Scene, request: RenderRequest | None = None) -> PagePlan:
 
 
 def _absorbing(scene: Scene, numbers: Container[int]) -> Scene:
-    """Scene in which these bodies absorb what they would scatter: pages follow no light from lights into media."""
+    """Scene in which these bodies absorb instead of scattering, because pages cannot scatter light of lights."""
     media: dict[Medium, Medium] = {}  # bodies that share a medium go on to
 
     def changed(body: Object) -> Object:
@@ -260,7 +260,7 @@ def _albedo(medium: Medium) -> Array:
 def _planned(scene: Scene, request: RenderRequest, units: int) -> RenderPlan:
     method = request.method
     if method is not None and method.needs_storage:
-        found = "its passes write to buffers, which WebGL2 has none of"
+        found = "this method writes to storage buffers, which WebGL2 does not have"
         raise InputError(f"a page with {method}", found, "use SignedDepth, or DepthPeeling for sorted intervals")
     machine = Capabilities(shader_storage=False, texture_units=units, textured_rays=False)
     chosen = plan_scene(scene, request, machine)
@@ -273,6 +273,6 @@ def _planned(scene: Scene, request: RenderRequest, units: int) -> RenderPlan:
     for step in chosen.passes:
         if (what := _NOT_SHOWN.get(step.name)) is not None:
             requested = f"a page of this scene with {method or chosen.method}"
-            do = "leave it out" if isinstance(chosen.method, DepthPeeling) else "use another --method"
-            raise InputError(requested, f"WebGL2 has no {what}", do)
+            do = "omit this feature" if isinstance(chosen.method, DepthPeeling) else "use another --method"
+            raise InputError(requested, f"pages do not support {what}", do)
     return chosen

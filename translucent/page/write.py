@@ -257,7 +257,7 @@ def frame_html(frame: Frame, exposure: float, tone: str, name: str | None) -> st
     requested = f"a page of {frame!r}"
     scene, request = frame.scene, frame.plan.request
     if scene is None:
-        found = "it holds no scene: it was drawn before a backdrop, or put together by hand"
+        found = "the frame has no scene, because it was rendered in front of a backdrop, or made by hand"
         raise InputError(requested, found, "write a page of the whole scene: tl.write_page(scene, 'viewer.html')")
     if request.caustics is not None:
         raise InputError(

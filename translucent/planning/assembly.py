@@ -86,7 +86,7 @@ def assembled(
         machine = capabilities.software, capabilities.shader_storage
         hits, slower = chosen_hits("TracedInterfaces", interfaces.hits, *machine)
         cost = found[1].cost * (EMBREE_COST if hits == "embree" else 1.0)
-        found = found[0], replace(found[1], reason=f"{found[1].reason}; {HITS[hits]} finds what they hit", cost=cost)
+        found = found[0], replace(found[1], reason=f"{found[1].reason}; {HITS[hits]} finds the hits", cost=cost)
     unlit = _unlit_passes(scene, spectral) if scatters(scene) and not capabilities.shader_storage else ()
     passes = (
         *_opaque_passes(scene),
@@ -114,9 +114,7 @@ def _unlit_passes(scene: Scene, spectral: bool) -> tuple[PassSpec, ...]:
     """Pass that marks the pixels in which media scatter light that this OpenGL version cannot follow."""
     media = ((i, scene.objects[i].medium) for i in solids_of(scene))
     scattering = tuple(i for i, medium in media if medium is not None and medium.scatters)
-    reason = (
-        "paths in media that scatter: this OpenGL cannot follow lights into media, so their pixels are marked invalid"
-    )
+    reason = "this OpenGL cannot compute scattered light, so pixels of scattering media are marked as invalid"
     cost = SignedDepth.cost_for(spectral=spectral)
     return (PassSpec(PassName.UNLIT, reason, scattering, 1, target="unlit", cost=cost),)
 
@@ -152,29 +150,32 @@ def _interface_passes(scene: Scene, method: Method, interfaces: InterfaceMode, i
     straight = method.makes_sheets or all(scene.objects[i].sheet_thickness is not None for i in found)
     drawn, shaded = interfaces.passes(scene, straight=straight)
     if instead and shaded.name is PassName.SURFACES:
-        shaded = replace(shaded, reason=f"{shaded.reason}; in screen space, since {instead}")
+        shaded = replace(shaded, reason=f"{shaded.reason}; in screen space, because {instead}")
     return drawn, shaded
 
 
 def _touching(scene: Scene, method: Method, interfaces: InterfaceMode) -> tuple[Note, ...]:
-    """Note for a method that does not find where rays leave all bodies, and so refracts them between touching ones."""
+    """Note for methods that do not know the first exit from all bodies, and refract rays between touching bodies."""
     if not interfaces.finds_exits or method.finds_exits or method.makes_sheets:
         return ()
     if (touching := touching_interfaces(scene)) is None:
         return ()
-    text = f"{touching}; {type(method).__name__} lacks this order, and takes the interface between them for the last"
+    text = (
+        f"{touching}; {type(method).__name__} does not know this order, and treats the interface between the "
+        "bodies as the last"
+    )
     return (Note(NoteKind.TOUCHING_INTERFACES, text),)
 
 
 def _through_bodies(scene: Scene, interfaces: InterfaceMode) -> tuple[Note, ...]:
-    """Notes on shadows on interfaces that are not rendered: maps have what is on the path to opaque objects alone."""
+    """Notes on missing shadows on interfaces."""
     notes = []
     if not interfaces.traced and dims_interfaces(scene):
         notes.append("bodies in front of a light do not dim its highlights and diffuse reflection")
     reflects = (body.surface is not None and body.surface.transmission < 1 for body in scene.bodies if not body.covers)
     if scene.environment_shadows and any(reflects):
-        notes.append("diffuse reflection of the environment is not dimmed by objects in the way")
-    return tuple(Note(NoteKind.SHADOWS, f"shadows on bodies: {text}") for text in notes)
+        notes.append("objects do not dim the diffuse reflection of the environment")
+    return tuple(Note(NoteKind.SHADOWS, f"shadows on bodies are missing: {text}") for text in notes)
 
 
 def _limits(scene: Scene, method: Method) -> tuple[Note, ...]:
@@ -189,7 +190,11 @@ def _limits(scene: Scene, method: Method) -> tuple[Note, ...]:
 def _declared_sheets(scene: Scene) -> tuple[PassSpec, ...]:
     if not (sheets := sheets_of(scene)):
         return ()
-    return (sheet_pass(sheets, f"{count_of(sheets, 'mesh', 'meshes')} declared thin: paths through faces add up"),)
+    return (
+        sheet_pass(
+            sheets, f"{count_of(sheets, 'mesh', 'meshes')}, thin-walled: the path lengths through all faces are summed"
+        ),
+    )
 
 
 def _fallback_passes(scene: Scene, spectral: bool) -> tuple[PassSpec, ...]:
@@ -198,15 +203,15 @@ def _fallback_passes(scene: Scene, spectral: bool) -> tuple[PassSpec, ...]:
     if not leaky:
         return ()
     reason = (
-        f"{object_names([scene.objects[i] for i in leaky])} not closed: pixels that enter and leave unequally often "
-        f"get sheets of {FALLBACK_SHEET:.0%} of the diagonal, and are marked invalid"
+        f"{object_names([scene.objects[i] for i in leaky])}: not closed; pixels with unequal entries and exits show "
+        f"sheets of {FALLBACK_SHEET:.0%} of the diagonal, and are marked as invalid"
     )
     sheets = leaky + sheets_of(scene)
     as_sheets = PassSpec(PassName.THIN_LAYER_FALLBACK, reason, sheets, 1, "fallback", ThinLayer.cost)
     closed = tuple(i for i in solids_of(scene) if i not in leaky)
     if not closed:
         return (as_sheets,)
-    reason = "closed bodies, in the same pixels"
+    reason = "thickness of the closed bodies, in the pixels of the open bodies"
     cost = SignedDepth.cost_for(spectral=spectral)
     return (as_sheets, PassSpec(PassName.SIGNED_DEPTH_FALLBACK, reason, closed, 1, "fallback", cost))
 
@@ -223,8 +228,8 @@ def _light_views(scene: Scene, method: Method) -> tuple[PassSpec, ...]:
             f"remove {lights - MAX_SCATTER_LIGHTS} lights, or use media without scattering",
         )
     reason = (
-        f"{lights} {'light' if lights == 1 else 'lights'} on a medium that scatters: the surfaces on the way from each "
-        f"light, in order, give how much of it reaches the {method.light_points} points of an interval"
+        f"{lights} {'light' if lights == 1 else 'lights'} in scattering media: the sorted surfaces on the way from "
+        f"each light give the light at {method.light_points} points of each interval"
     )
     # From each light, surfaces are kept in lists.
     cost = lights * FragmentLists.cost
@@ -235,8 +240,8 @@ def _opaque_passes(scene: Scene) -> tuple[PassSpec, ...]:
     if not (opaque := indices(scene, lambda item: item.medium is None)):
         return ()
     reason = (
-        f"{count_of(opaque, 'opaque object', 'opaque objects')}: depth and color of the nearest, where rays through "
-        "the media end"
+        f"{count_of(opaque, 'opaque object', 'opaque objects')}: depth and color of the nearest surface, where rays "
+        "through media end"
     )
     return (PassSpec(PassName.OPAQUE, reason, opaque, 1, cost=COSTS["opaque"]),)
 
@@ -246,9 +251,11 @@ def _shading(scene: Scene, method: Method, *, ambient: bool) -> str:
     if not any(body.medium is not None and body.medium.emits for body in scene.bodies):
         found = "Beer-Lambert: what is behind, through exp(-optical depth)"
     elif method.ordered:
-        found = "Beer-Lambert: what is behind, through exp(-optical depth), and what the intervals emit"
+        found = (
+            "Beer-Lambert: light from behind the media, times exp(-optical depth), plus the emission of the intervals"
+        )
     else:
-        found = "Beer-Lambert, and the emission of the one medium in closed form, q / sigma_t (1 - T)"
+        found = "Beer-Lambert, plus the emission of the single medium in closed form, q / sigma_t (1 - T)"
     return f"{found}; {AMBIENT}" if ambient else found
 
 
@@ -258,7 +265,7 @@ def _layer_passes(scene: Scene) -> tuple[PassSpec, ...]:
     reasons = []
     if layers:
         names = object_names(scene.objects[i] for i in layers)
-        reasons.append(f"{names}: each covers a share of what is behind it, and shows its own light there")
+        reasons.append(f"{names}: partly transparent layers over the picture")
     if emitting:
         reasons.append(f"{object_names(scene.objects[i] for i in emitting)}: the surface emits light")
     if not reasons:

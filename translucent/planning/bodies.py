@@ -27,7 +27,7 @@ MOST_TEXELS = 1 << 24
 
 @dataclass(frozen=True, eq=False)
 class Slot:
-    """Group of bodies that share one winding number, as their intervals are not kept apart.
+    """Group of bodies that share one winding number.
 
     Attributes
     ----------
@@ -208,17 +208,17 @@ def textured_at_hits(scene: Scene) -> bool:
 
 
 def unread_at_hits(scene: Scene) -> list[Note]:
-    """Notes on what rays do not read of surfaces."""
+    """Notes on textures that traced rays do not read."""
     if not (bodies := [body for body in scene.objects if has_more(body)]):
         return []
-    text = f"normal maps, occlusion and holes by alpha: rays meet {object_names(bodies)} without them"
+    text = f"{object_names(bodies)}: traced rays ignore normal maps, occlusion and alpha holes"
     return [Note(NoteKind.TEXTURES, text)]
 
 
 def untextured_rays(scene: Scene) -> list[Note]:
-    """Notes on textures where rays have the values of a surface where a pixel shows it first, or without textures."""
+    """Notes on objects whose textures traced rays replace by one color."""
     names = object_names(body for body in scene.objects if varies_at_hits(body))
-    text = f"textures and vertex colors behind the first surface of a ray: {names} have one color for these rays"
+    text = f"{names}: behind the first surface of a ray, one color replaces textures and vertex colors"
     return [Note(NoteKind.TEXTURES, text)]
 
 
@@ -228,9 +228,7 @@ def reduced_at_hits(scene: Scene) -> list[Note]:
     bodies = [body for body in scene.objects if halved.intersection(filter(None, textures_at_hits(body)))]
     if not bodies:
         return []
-    text = (
-        f"fine texels: textures of {object_names(bodies)} are halved for rays, which have {MOST_TEXELS:,} texels in all"
-    )
+    text = f"{object_names(bodies)}: textures are halved for traced rays, which can read {MOST_TEXELS:,} texels in all"
     return [Note(NoteKind.TEXTURES, text)]
 
 

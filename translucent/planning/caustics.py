@@ -98,7 +98,7 @@ UNREQUESTED, PHOTONS_OF_A_PIXEL = 1.0 / 3.0, (1.0, 4.0)
 
 
 def affordable_caustics(scene: Scene, samples: int, pixels: int, *, embree: bool) -> Caustics | None:
-    """Photons that a picture gets unrequested; None where they would take more than a third of its time.
+    """Default caustics of a picture; None if they would take more than a third of its time.
 
     Estimated is the time of s samples of P pixels with L lights, s P (a + b L), against that of N photons in r samples,
     r P c + N d, as measured: `PIXEL_SAMPLE`, `LIGHT_SAMPLE`, `RECEIVER`, `PHOTON`.
@@ -123,7 +123,7 @@ def affordable_caustics(scene: Scene, samples: int, pixels: int, *, embree: bool
 
 
 def opaque_to_shadows(scene: Scene) -> frozenset[int]:
-    """Numbers of the objects that stop the straight light of the lights where photons carry it: solids that bend it."""
+    """Numbers of the objects whose refraction replaces straight shadows by photons."""
     return frozenset(
         i for i, body in enumerate(scene.objects) if _redirects_light(body) and body.sheet_thickness is None
     )
@@ -142,9 +142,9 @@ def check_caustics(scene: Scene, method: Method | None, lit: tuple[int, ...]) ->
     """
     if method is not None and (method.follows_paths or method.makes_sheets):
         found = (
-            "its paths do not see the caustics on opaque objects behind interfaces"
+            "this method does not show caustics on opaque objects behind interfaces"
             if method.follows_paths
-            else "it treats every face as a sheet, which refracts no light"
+            else "this method treats every face as a sheet, which does not refract light"
         )
         raise InputError(f"caustics with {method}", found, "omit the caustics, or choose another method")
     _check_paths(scene, lit)
@@ -162,7 +162,7 @@ def passes_with_caustics(
         if one.name is PassName.OPAQUE:
             opaque = indices(scene, lambda item: item.medium is None)
             cost = caustics.cost_of_a_million * caustics.photons / 1e6 * (EMBREE_COST if hits == "embree" else 1.0)
-            reason = f"{_landing(scene, caustics, why)}; {HITS[hits]} finds what they hit"
+            reason = f"{_landing(scene, caustics, why)}; {HITS[hits]} finds the hits"
             steps.append(PassSpec(PassName.CAUSTICS, reason, opaque, 1, cost=cost))
         elif one.name is PassName.SHADE and scene.opaque:
             steps[-1] = _shaded_with(steps[-1], scene, caustics, why)
@@ -172,14 +172,14 @@ def passes_with_caustics(
 def _shaded_with(step: PassSpec, scene: Scene, caustics: Caustics, why: str) -> PassSpec:
     """Pass that shades opaque objects without OpenGL, with the photons that land on them."""
     seconds = caustics.photons * SECONDS_OF_A_PHOTON * len(scene.objects)
-    landed = f"{_landing(scene, caustics, why)}, followed on the processor, about {seconds:.2g} s"
+    landed = f"{_landing(scene, caustics, why)}; the CPU traces them in about {seconds:.2g} s"
     return replace(step, reason=f"{step.reason}; {landed}")
 
 
 def _landing(scene: Scene, caustics: Caustics, why: str) -> str:
     return (
         f"{why}: {caustics.photons:,} photons from {count_of(tuple(range(len(scene.lights))), 'light', 'lights')} "
-        f"through {_bending(scene)}, added to what opaque objects reflect diffusely"
+        f"through {_bending(scene)}, added to the diffuse reflection of opaque objects"
     )
 
 
@@ -187,9 +187,9 @@ def _into_media(step: PassSpec, scene: Scene, lit: tuple[int, ...], caustics: Ca
     """Pass that shows light of media, with the photons that carry it there."""
     seconds = caustics.in_media * SECONDS_OF_A_PHOTON * len(scene.objects)
     reason = (
-        f"{step.reason}; requested: {caustics.in_media:,} photons, followed on the processor and again only where "
-        f"objects or lights change, carry what {_bending(scene)} bends into {_names(scene, lit)}, about "
-        f"{seconds:.2g} s"
+        f"{step.reason}; requested: {caustics.in_media:,} photons carry light through {_bending(scene)} into "
+        f"{_names(scene, lit)}; the CPU traces them in about {seconds:.2g} s, and again only if objects or lights "
+        "change"
     )
     return replace(step, reason=reason)
 
@@ -213,20 +213,20 @@ def _check_paths(scene: Scene, lit: tuple[int, ...]) -> None:
         do = "add a tl.PointLight, tl.SpotLight or tl.DirectionalLight; light of the environment makes no caustics"
         raise InputError("caustics", "the scene has no lights that can emit photons", do)
     if not any(_redirects_light(body) for body in scene.objects):
-        found = f"no interface of {object_names(scene.bodies)} bends or mirrors light"
+        found = f"no interface of {object_names(scene.bodies)} refracts or reflects light"
         raise InputError("caustics", found, "give a medium an index of refraction: ior=1.5")
     if not scene.opaque and not lit:
-        found = "no opaque object receives the light, and no other body scatters it"
+        found = "no opaque object and no scattering body can receive the light"
         raise InputError("caustics", found, "add a ground: tl.Object(mesh)")
     if uneven := [body for body in scene.bodies if body.density is not None]:
-        found = f"the density of {object_names(uneven)} varies, and photons follow even media"
+        found = f"the density of {object_names(uneven)} varies, but photons need media of constant density"
         raise InputError("caustics", found, "omit the caustics, or give these bodies the same density everywhere")
     if rough := [
         body
         for body in scene.bodies
         if body.sheet_thickness is not None and body.surface is not None and body.surface.roughness > 0.0
     ]:
-        found = f"{object_names(rough)}: a sheet that is rough"
+        found = f"{object_names(rough)}: photons cannot cross a rough sheet"
         raise InputError("caustics", found, "use a closed body instead of the sheet, or a sheet without roughness")
 
 
@@ -253,32 +253,35 @@ def caustics_to_request(scene: Scene) -> tuple[Note, ...]:
     if not scene.lights:
         if not scene.environment_shadows:
             return ()
-        text = f"light of the environment that {object_names(clear)} focuses onto other objects: tl.PathTraced shows it"
+        text = (
+            f"light of the environment that {object_names(clear)} focuses onto other objects is missing; "
+            "tl.PathTraced renders it"
+        )
         return (Note(NoteKind.CAUSTICS, text),)
     text = (
-        f"the bright spot in the shadow of {object_names(clear)}, several times as bright as the ground, and the dark "
-        "around the spot: --caustics (tl.Caustics()) shows both"
+        f"the caustic in the shadow of {object_names(clear)} is missing, a spot several times as bright as the "
+        "ground: add --caustics (tl.Caustics())"
     )
     return (Note(NoteKind.CAUSTICS, text),)
 
 
 def caustics_left_out(scene: Scene, lit: tuple[int, ...], fogs: tuple[int, ...], opengl: bool) -> tuple[Note, ...]:
     """Notes on light that photons do not carry."""
-    texts = ["caustics of light of the environment"]
+    texts = ["the environment causes no caustics"]
     if opengl:
-        hidden = "which are outside the picture or hidden by opaque objects"
-        texts.append(f"caustics on objects that are seen only through interfaces, {hidden}")
+        hidden = "outside the picture or behind opaque objects"
+        texts.append(f"no caustics on objects that are visible only through interfaces, {hidden}")
     dark = indices(scene, lambda body: body.medium is not None and body.medium.scatters)
     uneven = indices(scene, lambda body: body.medium is not None and body.medium.phase_function != ISOTROPIC)
     if others := tuple(i for i in dark if i not in lit):
-        texts.append(f"caustics in media that scatter: {_names(scene, others)}")
+        texts.append(f"no caustics in these scattering media: {_names(scene, others)}")
     if dark:
-        texts.append("photons that media scatter")
+        texts.append("photons that a medium scatters are lost")
     if aside := tuple(i for i in fogs if i in uneven):
-        texts.append(f"directions in which {_names(scene, aside)} scatters caustics: equally bright in all directions")
+        texts.append(f"{_names(scene, aside)}: caustic light is scattered equally in all directions")
     textured = indices(scene, lambda body: body.has_interface and varies_at_hits(body))
     if textured and (fogs or not opengl):
-        texts.append(f"textures of interfaces, where the CPU follows photons: {_names(scene, textured)}")
+        texts.append(f"{_names(scene, textured)}: photons on the CPU ignore the textures of these interfaces")
     return tuple(Note(NoteKind.CAUSTICS, text) for text in texts)
 
 

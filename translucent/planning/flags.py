@@ -21,5 +21,6 @@ class Flags:
 
     adaptive: bool = _flag(
         True,
-        "Trace rays in each pixel for as many samples as change the picture, or for all. Default: --adaptive.",
+        "Stop sampling a pixel when more samples no longer change it, or always trace all samples. Default: "
+        "--adaptive.",
     )

@@ -33,10 +33,7 @@ ONE_SHADED = 0.45
 #: Note of a plan in which rays hit interfaces as far as the first interval shows them.
 LATER_REFRACTION = Note(
     NoteKind.LATER_REFRACTION,
-    (
-        "refraction and reflection after the first body on a ray: the rest of the ray goes straight, and its "
-        "interfaces reflect only the environment"
-    ),
+    ("after the first body on a ray, the ray goes straight, and later interfaces reflect only the environment"),
 )
 
 
@@ -67,7 +64,7 @@ class InterfaceMode:
         return 0, 0
 
     def refusal(self, scene: Scene) -> tuple[str, str] | None:
-        """Reason why rays cannot bend so in a scene, and what to do; None if they can."""
+        """Reason why this method cannot render a scene, and advice; None if it can."""
         return None
 
     def passes(self, scene: Scene, *, straight: bool) -> tuple[PassSpec, PassSpec]:
@@ -111,7 +108,7 @@ def touching_interfaces(scene: Scene) -> str | None:
         return None
     earlier, later = (solids[index] for index in found)
     names = f"{earlier.mesh.name!r} and {later.mesh.name!r}"
-    return f"interfaces of {names} may touch: the order says where a ray leaves both"
+    return f"interfaces of {names} may touch, so the order of surfaces decides where a ray leaves both"
 
 
 def owners(scene: Scene) -> str:
@@ -125,11 +122,11 @@ def effects_of(scene: Scene, *, bends: bool = True, mirrored: str = "the environ
     surfaces = [body.surface for body in bodies if body.surface is not None]
     effects = []
     if any(body.medium is not None and body.medium.ior > 1 for body in bodies):
-        effects.append(f"interfaces mirror {mirrored}{' and bend rays' if bends else ''} (ior above 1)")
+        effects.append(f"interfaces reflect {mirrored}{' and refract rays' if bends else ''} (ior above 1)")
     if any(surface.roughness > 0 for surface in surfaces):
-        effects.append("rough interfaces blur both")
+        effects.append("rough interfaces blur the light")
     if bends and any(surface.dispersion > 0 for surface in surfaces):
-        effects.append("dispersion bends each channel on its own")
+        effects.append("dispersion refracts each color channel differently")
     if any(surface.iridescence for surface in surfaces):
         effects.append("thin films color the reflection")
     if any(surface.clearcoat for surface in surfaces):
@@ -139,9 +136,9 @@ def effects_of(scene: Scene, *, bends: bool = True, mirrored: str = "the environ
     if any((np.asarray(surface.color) != 1).any() or surface.color_texture for surface in surfaces):
         effects.append("colors tint light that enters")
     if any(treatment_of(body) is Treatment.LAYER for body in bodies):
-        effects.append("light that scatters many times leaves as from a layer (Kubelka and Munk, Saunderson)")
+        effects.append("multiply scattered light leaves as from a flat layer (Kubelka and Munk, Saunderson)")
     if any(treatment_of(body) is Treatment.DIFFUSION for body in bodies):
-        effects.append("light that scatters many times diffuses in the body and leaves through the surface")
+        effects.append("multiply scattered light diffuses in the body and leaves through the surface")
     return "; ".join(effects) or "interfaces"
 
 
@@ -164,26 +161,26 @@ class FrontInterface(InterfaceMode):
     one_interface: ClassVar[bool] = True
 
     def refusal(self, scene: Scene) -> tuple[str, str] | None:
-        """Reason: rays start inside a body, and have no front interface there."""
+        """Reason if rays start inside a body, where there is no front interface."""
         for body in scene.bodies:
             if body.has_interface and body.sheet_thickness is None and starts_inside(scene, body):
                 return (
-                    f"rays start inside {body.mesh.name!r}, and meet no interface where they would enter it",
+                    f"rays start inside {body.mesh.name!r}, so no interface is in front of it",
                     "use ScreenInterfaces(), or move the camera outside",
                 )
         return None
 
     def passes(self, scene: Scene, *, straight: bool) -> tuple[PassSpec, PassSpec]:
         """Passes: one draw of all bodies with interfaces, and one over pixels."""
-        found = f"{owners(scene)}: normal and place of the interface where a ray enters"
-        shaded = f"{effects_of(scene)}; rays bend where they enter and go straight on"
+        found = f"{owners(scene)}: normal and position of the interface where each ray enters"
+        shaded = f"{effects_of(scene)}; rays are refracted where they enter, and then go straight"
         return (
             PassSpec(PassName.INTERFACES, found, with_interfaces(scene), 1, cost=DRAW_COST * ONE_DRAWN),
             PassSpec(PassName.SURFACES, shaded, cost=SHADE_COST * ONE_SHADED),
         )
 
     def unmodelled(self) -> list[Note]:
-        """Notes: what lies beyond the first interval, and the bend where rays leave."""
+        """Notes on later refraction, and on missing refraction at exits."""
         return [LATER_REFRACTION, ONE_INTERFACE]
 
 
@@ -217,15 +214,15 @@ class ScreenInterfaces(InterfaceMode):
                     cost=SHADE_COST,
                 ),
             )
-        found = f"{names}: normal and place of the interface where a ray enters, and of the one where it leaves"
-        shaded = f"{effects_of(scene)}; the path through the first interval bends with it"
+        found = f"{names}: normals and positions of the interfaces where each ray enters and leaves"
+        shaded = f"{effects_of(scene)}; the refracted path through the first interval is followed"
         return (
             PassSpec(PassName.INTERFACES, found, objects, 2, cost=DRAW_COST),
             PassSpec(PassName.SURFACES, shaded, cost=SHADE_COST),
         )
 
     def unmodelled(self) -> list[Note]:
-        """Notes: what lies beyond the first interval."""
+        """Notes on later refraction."""
         return [LATER_REFRACTION]
 
 
@@ -284,29 +281,29 @@ class TracedInterfaces(InterfaceMode):
         return self.depth, self.forks
 
     def refusal(self, scene: Scene) -> tuple[str, str] | None:
-        """Reason against traced rays: they would start in different media, or cross one that varies."""
+        """Reason against traced rays: they start in different media, or cross a varying density."""
         solids = [body for body in scene.bodies if body.sheet_thickness is None]
         if cut := [body for body in solids if picture_cuts(scene, body)]:
             return (
-                f"the orthographic picture's plane, where rays start, cuts {object_names(cut)}",
+                f"the image plane of the orthographic camera, where rays start, cuts {object_names(cut)}",
                 "use ScreenInterfaces(), or move the camera outside",
             )
         if varying := [body for body in solids if body.density is not None]:
             return (
-                f"{object_names(varying)}: the density varies, and rays cross media in one step",
+                f"{object_names(varying)}: the density varies, but traced rays cross each medium in one step",
                 "use ScreenInterfaces()",
             )
         return None
 
     def passes(self, scene: Scene, *, straight: bool) -> tuple[PassSpec, PassSpec]:
         """Passes: one draw of all bodies with interfaces, and one over pixels that traces."""
-        found = f"{owners(scene)}: normal and place of the first interface on each ray"
-        effects = effects_of(scene, bends=not straight, mirrored="what is around them")
-        traced = f"{effects}; rays are traced from there on, through at most {self._count}"
+        found = f"{owners(scene)}: normal and position of the first interface on each ray"
+        effects = effects_of(scene, bends=not straight, mirrored="the surroundings")
+        traced = f"{effects}; rays are traced on from this interface, through at most {self._count}"
         if self.forks:
             traced += f", and {self._times} along the weaker of the reflected and the refracted ray"
         if (mirror := mirror_of(scene)) is not None:
-            traced += f"; {mirror.ground.mesh.name!r} mirrors what stands on it, once"
+            traced += f"; {mirror.ground.mesh.name!r} reflects the objects on it, once"
         if dims_interfaces(scene):
             traced += "; straight rays to the lights find how much bodies dim highlights and diffuse reflection"
         return (
@@ -315,11 +312,11 @@ class TracedInterfaces(InterfaceMode):
         )
 
     def unmodelled(self) -> list[Note]:
-        """Notes: what the tree leaves out."""
+        """Notes on rays that are cut off."""
         often = f" more often than {self._times}" if self.forks else ""
         text = (
-            f"rays that cross more than {self._count}, or that follow the weaker of the reflected and the refracted "
-            f"ray{often}: these rays see the environment, as if nothing was in front of it"
+            f"rays that cross more than {self._count}, or follow the weaker of the reflected and the refracted "
+            f"ray{often}, see the environment, as if nothing were in front of it"
         )
         return [Note(NoteKind.CUT_OFF_PATHS, text)]
 

@@ -60,12 +60,11 @@ def hole_limits(scene: Scene, method: Method) -> list[Note]:
     for i in open_bodies(scene):
         mesh, name = scene.objects[i].mesh, type(method).__name__
         if i in around:
-            text = (
-                f"the eye is within its bounds: {name} cannot tell which pixels show two holes, and marks all invalid"
-            )
+            text = f"the eye is within the bounds of this open mesh, so {name} marks all its pixels as invalid"
         elif mesh.diagnosis.holes > 1:
             text = (
-                f"{mesh.diagnosis.holes} holes: {name} may not notice rays through two holes, since their errors cancel"
+                f"the mesh has {mesh.diagnosis.holes} holes, and {name} may miss rays through two holes, whose "
+                "errors cancel"
             )
         else:
             continue
@@ -91,16 +90,16 @@ def mesh_limits(scene: Scene, method: Method) -> list[Note]:
     for body in scene.bodies:
         diagnosis = body.mesh.diagnosis
         if found := diagnosis.duplicate_faces:
-            text = f"{body.mesh.name!r}: {found.count} duplicated faces, whose distances count twice or cancel"
+            text = f"{body.mesh.name!r}: {found.count} faces are duplicated, so their distances count twice or cancel"
             limits.append(Note(NoteKind.DUPLICATED_FACES, text))
         if diagnosis.inside_out and body.sheet_thickness is None and not method.makes_sheets:
             parts = diagnosis.inside_out_parts
-            what = f"{parts} closed parts inside out" if parts else "inside out in places"
+            what = f"{parts} closed parts are inside out" if parts else "the mesh is inside out in places"
             marked = (
-                "their pixels are marked invalid"
+                "these pixels are marked as invalid"
                 if method.ordered
-                else f"{type(method).__name__} cannot say which pixels show one, so all that it covers are marked "
-                "invalid; FragmentLists can"
+                else f"{type(method).__name__} cannot tell which pixels are wrong, and marks all as invalid; "
+                "FragmentLists can"
             )
             limits.append(Note(NoteKind.INSIDE_OUT, f"{body.mesh.name!r}: {what}: {marked}"))
     return list(dict.fromkeys(limits))
@@ -122,12 +121,12 @@ def scattering_limits(scene: Scene) -> list[Note]:
 
 
 def sheet_limits(scene: Scene) -> list[Note]:
-    """Notes on what sheets among ordered intervals leave out."""
+    """Notes on errors of sheets among ordered intervals."""
     if not sheets_of(scene) or not any(body.medium is not None and body.medium.emits for body in scene.bodies):
         return []
     text = (
-        "declared sheets among media that emit: sheets dim all light on a ray, even light in front of them, and the "
-        "emission of sheets is left out"
+        "sheets among media that emit light: a sheet dims all light on its ray, even light in front of it, and "
+        "emits none"
     )
     return [Note(NoteKind.SHEETS_WITHOUT_ORDER, text)]
 
@@ -137,17 +136,17 @@ def layer_effects(scene: Scene, *, interfaces: bool) -> list[Note]:
     effects = []
     if layers := object_names(item for item in scene.bodies if item.covers):
         text = (
-            f"{layers}: layers cast no shadows, refracted rays do not meet layers, all media on a ray dim the layers "
-            "behind its first body, and layers are drawn object by object, the farthest first, even where they cross"
+            f"{layers}: these layers cast no shadows, are invisible to refracted rays, are dimmed by all media on a "
+            "ray behind its first body, and are sorted by object, even where they intersect"
             if interfaces
-            else f"what layers mirror: {layers} show diffuse light alone"
+            else f"{layers}: these layers reflect only diffusely"
         )
         effects.append(Note(NoteKind.LAYERS, text))
     if emitting := object_names(scene.objects[i] for i in emitting_bodies(scene)):
         where = "behind the first surface on each ray" if interfaces else "in the whole picture"
-        effects.append(Note(NoteKind.GLOW, f"light that surfaces emit: missing {where} ({emitting})"))
+        effects.append(Note(NoteKind.GLOW, f"{emitting}: light that these surfaces emit is missing {where}"))
     if cut := object_names(item for item in scene.bodies if _wants_holes(item)):
-        text = f"holes by alpha_cutoff: {cut} drawn closed, since a solid with a hole has no inside"
+        text = f"{cut}: holes by alpha_cutoff are drawn closed, because a solid with holes has no inside"
         effects.append(Note(NoteKind.HOLES, text))
     return effects
 
@@ -160,10 +159,10 @@ def _wants_holes(item: Object) -> bool:
 
 
 #: Note of a plan in which interfaces do nothing to light.
-STRAIGHT = Note(NoteKind.REFRACTION, "refraction and reflection: rays go straight through interfaces")
+STRAIGHT = Note(NoteKind.REFRACTION, "rays go straight through interfaces, without refraction or reflection")
 
 #: How a plan with ambient radiance shades pixels, beside what it does without.
-AMBIENT = "of the ambient radiance A, media scatter sigma_s A for each metre, which counts as emitted"
+AMBIENT = "media emit the ambient radiance A that they scatter, sigma_s A per metre"
 
 
 def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: InterfaceMode | None = None) -> tuple[Note, ...]:
@@ -181,16 +180,16 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: InterfaceM
     effects = _scattering_effects(scene, followed=scattering, interfaces=surfaces)
     effects += _refraction_effects(scene, interfaces)
     if clear := [body for body in scene.bodies if _is_invisible(body)]:
-        text = f"{object_names(clear)}: invisible, since nothing in it absorbs, scatters or emits"
+        text = f"{object_names(clear)}: invisible, because the medium does not absorb, scatter or emit light"
         effects.append(Note(NoteKind.INVISIBLE, text))
     if not surfaces and (surfaced := [item for item in scene.opaque if item.surface is not None]):
-        text = f"surfaces of opaque objects: {object_names(surfaced)} reflect diffusely, in one color each"
+        text = f"{object_names(surfaced)}: these opaque surfaces reflect only diffusely, each in one color"
         effects.append(Note(NoteKind.OPAQUE_SURFACES, text))
     effects += layer_effects(scene, interfaces=surfaces)
     effects += shadow_effects(scene) if scene.opaque else []
     effects += reflected_effects(scene) if surfaces else []
     if scene.overlap != "priority" and len({body.priority for body in scene.bodies}) > 1:
-        text = f'priorities: overlap="{scene.overlap}" does not use them'
+        text = f'overlap="{scene.overlap}" ignores the priorities of objects'
         effects.append(Note(NoteKind.UNUSED_PRIORITIES, text))
     return tuple(effects)
 
@@ -199,7 +198,7 @@ def with_ambient(notes: Iterable[Note]) -> tuple[Note, ...]:
     """Notes of a plan in which media emit the ambient radiance that they would scatter."""
     dimmed = Note(
         NoteKind.DIMMED_AMBIENT,
-        "shadows in ambient light: ambient light reaches every point of the media without attenuation",
+        "ambient light reaches every point of the media without shadows or attenuation",
     )
     return (*(note for note in notes if note.kind is not NoteKind.ONLY_REMOVES), dimmed)
 
@@ -212,7 +211,7 @@ def layers_instead(scene: Scene, refusals: Iterable[tuple[int, str]]) -> tuple[N
     return tuple(
         Note(
             NoteKind.LAYER_INSTEAD,
-            f"diffusion in {object_names(items)}: {why}; these bodies are rendered as flat layers",
+            f"{object_names(items)}: flat layers replace diffusion, because {why}",
         )
         for why, items in reasons.items()
     )
@@ -226,8 +225,8 @@ def shadow_effects(scene: Scene) -> list[Note]:
         ground = ground_below(scene, shadowing) if shadowing else None
         if ground is None or len(scene.objects) > len(shadowing) + 1:
             text = (
-                "shadows of the environment: its light reaches opaque objects as if nothing was in the way, so that a "
-                "ground is up to twice as bright beside objects that stand on it"
+                "the environment casts no shadows on opaque objects, so a ground is up to twice as bright beside "
+                "objects that stand on it"
             )
             if ground is not None:
                 names = object_names([scene.objects[i] for i in shadowing])
@@ -235,7 +234,7 @@ def shadow_effects(scene: Scene) -> list[Note]:
             notes.append(Note(NoteKind.SHADOWS, text))
     layers = [body for body in scene.bodies if body.covers]
     if layers and (scene.lights or scene.environment_shadows):
-        text = f"shadows of layers: light reaches opaque objects through {object_names(layers)}"
+        text = f"{object_names(layers)}: these layers cast no shadows on opaque objects"
         notes.append(Note(NoteKind.SHADOWS, text))
     return notes
 
@@ -246,8 +245,8 @@ def reflected_effects(scene: Scene) -> list[Note]:
     if not (held := [item for item in scene.opaque if any(_may_hold(body, item) for body in clear)]):
         return []
     text = (
-        f"light that interfaces refract on its way to {object_names(held)}, and light that opaque objects reflect onto "
-        "each other: these objects are up to 20 % too dark; random paths include this light (--method path-traced)"
+        f"{object_names(held)}: up to 20 % too dark, without light that interfaces refract onto these objects, and "
+        "light that opaque objects reflect onto each other; --method path-traced includes this light"
     )
     return [Note(NoteKind.REFLECTED_LIGHT, text)]
 
@@ -258,33 +257,32 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
     bodies = [body for body in scene.bodies if body.medium is not None and body.medium.scatters]
     if any(treatment_of(body) is Treatment.VOLUME for body in bodies):
         text = (
-            "light that is scattered more than once: shadows that opaque objects and other bodies throw into the "
-            "medium, "
-            "and light of these objects that the medium scatters forward on its way to the eye"
+            "fog: opaque objects and other bodies cast no shadows on light that is scattered more than once, and "
+            "fog does not scatter the light of these objects forward to the eye"
         )
         if scene.opaque:
-            text += "; light that grounds reflect into the medium, up to 45 % of the light of a body on a bright ground"
+            text += "; light that the ground reflects into the fog is missing, up to 45 % on a bright ground"
         volumes = [body for body in bodies if treatment_of(body) is Treatment.VOLUME]
         sharp = bool(scene.lights) or scene.environment.kind == "image"
         if sharp and any(body.medium.anisotropy >= STRONGLY_AHEAD for body in volumes if body.medium):
-            text += "; rims of fog that scatters forward are up to 15 % too bright before a light or a bright sky"
+            text += "; rims of fog that scatters forward are up to 15 % too bright in front of a light or a bright sky"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     rendered = (Treatment.VOLUME, Treatment.LAYER) if interfaces else (Treatment.VOLUME,)
     if media := [body.medium for body in bodies if body.medium and treatment_of(body) not in rendered]:
         if followed:
             densest = max(float(np.max(np.asarray(medium.scattering))) for medium in media)
             text = (
-                "light that is scattered more than once: much of the light in bodies thicker than a mean free path, "
-                f"{1 / densest:.2g} m; and light of the environment that is scattered"
+                "light that is scattered more than once is missing, much of the light in bodies thicker than a "
+                f"mean free path ({1 / densest:.2g} m), and so is scattered light of the environment"
             )
             return [*notes, Note(NoteKind.SCATTERED_AGAIN, text)]
         if not scene.lights:
-            return [*notes, Note(NoteKind.ONLY_REMOVES, "in-scattered light: scattering only removes light from rays")]
-        text = "in-scattered light: this method leaves out light that media scatter into rays; FragmentLists renders it"
+            return [*notes, Note(NoteKind.ONLY_REMOVES, "scattering only removes light from rays, and adds none")]
+        text = "this method leaves out the light that media scatter into rays; FragmentLists renders this light"
         return [*notes, Note(NoteKind.LIGHTS_LEFT_OUT, text)]
     lit = scene.opaque or any(body.covers or (interfaces and body.has_interface) for body in scene.bodies)
     if not notes and scene.lights and not lit:
-        text = "lights have no effect, since no medium scatters and nothing is opaque"
+        text = "lights have no effect, because no medium scatters and no object is opaque"
         return [Note(NoteKind.UNUSED_LIGHTS, text)]
     return notes
 
@@ -304,18 +302,18 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
     notes = []
     if any(treatment_of(body) is Treatment.LAYER for body in scene.bodies):
         text = (
-            "sideways spread of light that is scattered many times: light leaves as from a flat layer, as thick as the "
+            "multiply scattered light does not spread sideways: it leaves as from a flat layer as thick as the "
             "path of the ray, so edges and folds are wrong"
         )
         notes.append(Note(NoteKind.SPREAD_INSIDE, text))
     if bodies := [body for body in scene.bodies if treatment_of(body) is Treatment.DIFFUSION]:
         text = (
-            f"{object_names(bodies)}: light of the environment that other bodies scatter onto these bodies, and "
-            f"details "
-            "smaller than a cell of the diffusion grid: spikes and edges are up to 15 % too dark"
+            f"{object_names(bodies)}: without light of the environment that other bodies scatter onto these bodies, "
+            "and without details smaller than a cell of the diffusion grid: spikes and edges are up to 15 % too "
+            "dark"
         )
         if len(scene.bodies) > 1:
-            text += "; a body next to another is up to 10 % too dark"
+            text += "; a body next to another body is up to 10 % too dark"
         ahead = [body.medium is not None and body.medium.anisotropy >= STRONGLY_AHEAD for body in bodies]
         if any(ahead) and scene.environment.kind == "image":
             text += "; bright parts of the environment, scattered forward by the bodies, are up to 50 % too dark"
@@ -326,7 +324,7 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
         ground = ground_below(scene, [i for i, body in enumerate(scene.objects) if body in bodies])
         beside = [item for item in scene.opaque if not any(_may_hold(body, item) for body in bodies)]
         if others := [item for item in beside if ground is None or item is not ground.ground]:
-            text += f"; light of the bodies does not reach {object_names(others)}"
+            text += f"; light from these bodies does not reach {object_names(others)}"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     return notes
 

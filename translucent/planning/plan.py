@@ -122,7 +122,7 @@ def plan(
 
 
 def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities | None = None) -> RenderPlan:
-    """Choose the passes for what is requested of a scene.
+    """Choose the passes for a request.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
         hits, slower = chosen_hits("PathTraced", requested, machine.software, machine.shader_storage)
         (step,) = paths.passes(scene, "requested")
         cost = step.cost * (EMBREE_COST if hits == "embree" else 1.0)
-        step = replace(step, reason=f"{step.reason}; {HITS[hits]} finds what they hit", cost=cost)
+        step = replace(step, reason=f"{step.reason}; {HITS[hits]} finds the hits", cost=cost)
         found = replace(
             found,
             scene=rendered_scene(scene, Treatments(everywhere)),
@@ -171,7 +171,10 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
     if request.caustics is not None:
         found = _with_caustics(found, scene, request.caustics, machine, "requested")
     elif (unrequested := _unrequested_caustics(found, scene, request, machine)) is not None:
-        why = f"a light, a clear body and a ground, in less than {UNREQUESTED:.0%} of the time of the picture"
+        why = (
+            f"a light, a clear body and a ground, and photons take less than {UNREQUESTED:.0%} of the time of the "
+            "picture"
+        )
         found = _with_caustics(found, scene, unrequested, machine, why)
     elif paths is None:
         found = replace(found, unmodelled=(*found.unmodelled, *caustics_to_request(scene)))
@@ -182,14 +185,14 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
 
 
 def _denoised_note(found: RenderPlan) -> Note:
-    text = "denoised: a network (Open Image Denoise) replaces noise by its estimate, whose error is not known"
+    text = "denoised: Open Image Denoise replaces the noise by an estimate, whose error is unknown"
     return Note(
         NoteKind.DENOISED, text if found.has_noise else "the picture is not denoised, because it has no random noise"
     )
 
 
 def _with_point_lights(scene: Scene, rendered: Scene) -> tuple[Scene, tuple[Note, ...]]:
-    """The scene with points in place of spheres that shine, as many as shaders hold, and notes on it.
+    """The scene with point lights in place of sphere lights, and notes.
 
     `rendered` is the scene with its treatments: lights that are followed into its media are fewer.
     """
@@ -199,10 +202,10 @@ def _with_point_lights(scene: Scene, rendered: Scene) -> tuple[Scene, tuple[Note
     most = MAX_SCATTER_LIGHTS if scatters(rendered) else MAX_LIGHTS
     lights = without_spheres(scene.lights, most)
     count = (len(lights) - len(scene.lights)) // spheres + 1
-    text = f"shadows of sphere lights are those of {count} points each"
+    text = f"each sphere light casts the shadows of {count} point lights"
     if count < len(SPREADS[0]):
         where = "into media" if scatters(rendered) else "to surfaces"
-        text += f", and not of {len(SPREADS[0])}: no more than {most} lights are followed {where}"
+        text += f", not of {len(SPREADS[0])}, because at most {most} lights can shine {where}"
     return replace(scene, lights=lights), (Note(NoteKind.SPHERE_LIGHTS, text),)
 
 
@@ -260,13 +263,13 @@ def _method(
     interfaces: InterfaceMode,
     caustics: Caustics | None = None,
 ) -> tuple[Method, str]:
-    """The method of a renderer with OpenGL, and why it is that one; refuses what is requested if it cannot do."""
+    """Method of a renderer with OpenGL, and the reason; refuses requests that it cannot render."""
     if scene.varies:
         return marching_method(scene, method, machine), "the density varies from place to place"
     if method is None and any(treatment_of(body) is Treatment.VOLUME for body in scene.bodies):
         return scattered_again_method(
             scene, caustics
-        ), "light scattered many times into the rays: ray marching looks it up at each step"
+        ), "multiply scattered light, which ray marching looks up at each step"
     if method is not None and method.ordered:
         return method, "requested"
     if (why := why_order_matters(scene, method, interfaces)) is not None:
@@ -274,9 +277,9 @@ def _method(
     if method is not None:
         return method, "requested"
     if scatters(scene) and machine.shader_storage:
-        return FragmentLists(), "light scattered into the rays: each interval gathers light of the lights"
+        return FragmentLists(), "light scattered into the rays: each interval sums the light of all lights"
     if not solids_of(scene):
-        return ThinLayer(), "all bodies are declared sheets"
+        return ThinLayer(), "all bodies are thin-walled sheets"
     return SignedDepth(), "a sum over each ray suffices"
 
 
@@ -409,10 +412,12 @@ def _traced(
         raise InputError('TracedInterfaces(hits="gl")', "this renderer does not use OpenGL", "omit hits")
     reason = "no OpenGL: all surfaces on each ray, in float64"
     if method is not None and not sheets:
-        reason += f", in place of {method}, which was requested"
+        reason += f", in place of the requested {method}"
     if followed is not None and interfaces is not None and not interfaces.traced:
         reason += f"; and {followed} in place of {interfaces}"
-    shading = "sheets in order" if sheets else "the intervals between them in order, exactly"
+    shading = (
+        "sheets, sorted along each ray" if sheets else ("the intervals between the surfaces, in order and exactly")
+    )
     passes = (
         PassSpec(PassName.INTERSECT, reason, tuple(range(len(scene.objects))), 1),
         PassSpec(PassName.SHADE, f"{shading}; {AMBIENT}" if ambient else shading),
@@ -482,9 +487,9 @@ def _with_shadows(found: RenderPlan, scene: Scene, machine: Capabilities) -> Ren
         return found  # paths find shadows by themselves
     unmodelled: list[Note] = []
     if found.request.over_backdrop:
-        reason = "opaque objects are a picture drawn elsewhere (a backdrop): rays through the media end at its depth"
+        reason = "a backdrop (a picture with depth) replaces opaque objects: rays through media end at its depth"
         behind = (PassSpec(PassName.BACKDROP, reason, cost=COSTS["resolve"]),)
-        drawn_elsewhere = Note(NoteKind.SHADOWS, "shadows that the objects in the backdrop cast onto media")
+        drawn_elsewhere = Note(NoteKind.SHADOWS, "objects in the backdrop cast no shadows onto media")
         unmodelled = [*shadow_effects(scene), drawn_elsewhere]
     elif before and found.has(PassName.TRACED, PassName.SURFACES, PassName.PATH_TRACE):
         unmodelled = [*shadows_left_out(machine.texture_units)]
@@ -533,7 +538,7 @@ def _check_paths(scene: Scene, request: RenderRequest, method: PathTraced, machi
                 f"omit {what}, or choose another method",
             )
     if not machine.opengl:
-        found = "paths are followed by OpenGL, and this renderer works on the CPU"
+        found = "random paths need OpenGL, but this renderer works on the CPU"
         raise InputError(str(method), found, "use tl.reference.path_trace(scene, size, paths), or an OpenGL backend")
     method.check(scene)
 
@@ -547,9 +552,9 @@ def _check_backdrop(scene: Scene, request: RenderRequest) -> None:
             "remove these objects, or draw them into the backdrop",
         )
     if isinstance(request.method, PathTraced):
-        found = "the objects of a backdrop have no mesh that a path could meet"
+        found = "the objects of a backdrop have no mesh that a path could hit"
         do = "omit the backdrop, or choose another method"
         raise InputError(f"{request.method} in front of a backdrop", found, do)
     if request.interfaces is not None and request.interfaces.traced:
-        found = "the objects of a backdrop have no mesh that a ray could meet"
+        found = "the objects of a backdrop have no mesh that a ray could hit"
         raise InputError(f"{request.interfaces} in front of a backdrop", found, "use ScreenInterfaces() instead")

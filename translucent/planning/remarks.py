@@ -1,4 +1,4 @@
-"""Remarks of plans: bodies that are rendered right and that a picture hardly shows, each with what to do."""
+"""Remarks of plans on bodies that are rendered correctly but hardly visible, with advice."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ def _black_bodies(scene: Scene) -> tuple[Note, ...]:
     assert clearest.medium is not None
     chord, distance = _chord(clearest), _distance(clearest.medium, SHOWN)
     text = (
-        f"{object_names(body for _, body in black)}: black: {passed:.1e} of white light passes "
-        f"{_text(chord)}, the mean thickness{'' if len(black) == 1 else f' of {clearest.mesh.name!r}'}, and a "
-        f"fifth passes {_text(distance)}; diluted {chord / distance:.2g} times "
-        f"(--dilute {chord / distance:.2g}) it shows its color"
+        f"{object_names(body for _, body in black)}: black: only {passed:.1e} of white light passes {_text(chord)}, "
+        f"the mean thickness{'' if len(black) == 1 else f' of {clearest.mesh.name!r}'}; a fifth passes "
+        f"{_text(distance)}; diluted {chord / distance:.2g} times (--dilute {chord / distance:.2g}), the color "
+        "becomes visible"
     )
     return (Note(NoteKind.BLACK, text),)
 
@@ -69,7 +69,7 @@ def remarks(scene: Scene) -> tuple[Note, ...]:
 
 
 def _opaque_bodies(scene: Scene, known: set[NoteKind]) -> tuple[Note, ...]:
-    """Note on bodies whose scattered light leaves where it came in, as far as one sees."""
+    """Note on bodies that look opaque, because light leaves where it entered."""
     if NoteKind.BLACK in known:
         return ()
     bodies = [
@@ -88,18 +88,17 @@ def _opaque_bodies(scene: Scene, known: set[NoteKind]) -> tuple[Note, ...]:
         Note(
             NoteKind.OPAQUE_BODIES,
             (
-                f"{object_names((body for *_, body in bodies))}: opaque at this size, as plastic: light turns "
-                f"back within {_text(free)} (the mean free path), {times:.0f} times in "
-                f"{short_length(_size(worst))}; {other_size(scene.shown_bounds, GLOWING / times)} light would "
-                f"shine through its thin parts; so it would if the medium were diluted {times / GLOWING:.2g} "
-                f"times (--dilute {times / GLOWING:.2g})"
+                f"{object_names((body for *_, body in bodies))}: opaque at this size, like plastic: the mean free "
+                f"path is {_text(free)}, and {times:.0f} of these fit into {short_length(_size(worst))}; "
+                f"{other_size(scene.shown_bounds, GLOWING / times)} light would shine through thin parts, or with "
+                f"--dilute {times / GLOWING:.2g}"
             ),
         ),
     )
 
 
 def _unseen_bodies(scene: Scene) -> tuple[Note, ...]:
-    """Note on fog that light crosses as if there were none."""
+    """Note on fog that is too thin to be visible."""
     bodies = [
         (_size(body) * float(body.medium.extinction.max()), body)
         for body in _plain_bodies(scene)

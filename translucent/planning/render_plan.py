@@ -166,8 +166,8 @@ class RenderPlan:
         """Text on the models of multiple scattering and the number of bodies of each; empty without any."""
         modes = (
             (Treatment.DIFFUSION, f"diffuses ({self.diffusion})"),
-            (Treatment.VOLUME, f"is scattered on ({self.diffusion})"),
-            (Treatment.LAYER, "leaves as from layers"),
+            (Treatment.VOLUME, f"is added along view rays ({self.diffusion})"),
+            (Treatment.LAYER, "leaves as from flat layers"),
         )
         counts = ((len(self.treated(treatment)), mode) for treatment, mode in modes)
         return ", and ".join(
@@ -210,9 +210,9 @@ class RenderPlan:
 
     def invalid_text(self, invalid: int, covered: int) -> str:
         """Warning of so many pixels that cannot be trusted."""
-        unbalanced = "a surface that does not balance"
+        unbalanced = "rays that do not leave each body as often as they enter"
         if isinstance(self.interfaces, TracedInterfaces):
-            unbalanced += f", or more than {INTERIOR_SIZE} bodies over one another, where rays are traced"
+            unbalanced += f", or that are inside more than {INTERIOR_SIZE} bodies at once"
         why = "; ".join(map(str, self.limits)) or unbalanced
         return f"{invalid} pixels are not valid ({covered} are covered): {why}"
 
@@ -246,8 +246,8 @@ class RenderPlan:
         lines = [f"{self.runs}: {'exact' if self.exact else 'not exact everywhere'}{cost}"]
         lines += [f"  {i}. {step.name}: {step.reason}" for i, step in enumerate(self.passes, 1)]
         if mode := self.multiple_scattering:
-            lines.append(f"  light scattered many times {mode}")
+            lines.append(f"  multiply scattered light {mode}")
         lines += [f"  limit: {limit}" for limit in self.limits]
-        lines += [f"  not modelled: {effect}" for effect in self.unmodelled]
+        lines += [f"  approximation: {effect}" for effect in self.unmodelled]
         lines += [f"  remark: {remark}" for remark in self.remarks]
         return "\n".join(lines)

@@ -54,7 +54,7 @@ class RenderedObject(Object):
 
     @cached_property
     def has_interface(self) -> bool:
-        """True if its interface changes light: as of any object, or since light that was scattered leaves there."""
+        """True if the interface changes light, or scattered light leaves through it."""
         return super().has_interface or self.treatment in (Treatment.LAYER, Treatment.DIFFUSION)
 
 

@@ -70,7 +70,7 @@ class RenderRequest(Flags):
 
     def __post_init__(self) -> None:
         if not isinstance(self.samples, int) or not 1 <= self.samples <= MAX_SAMPLES:
-            found = f"not a whole number in 1 to {MAX_SAMPLES}"
+            found = f"the number of samples must be a whole number in 1 to {MAX_SAMPLES}"
             raise InputError(f"samples {brief(self.samples)}", found, "use a value such as 16")
         for name, kind, what, examples in _TYPES:
             value = getattr(self, name)
@@ -79,11 +79,11 @@ class RenderRequest(Flags):
                 do = f"give {', '.join(others)} or {last}" if others else f"give for example {last}"
                 if name == "interfaces" and isinstance(value, str) and value in _OLD_NAMES:
                     do = f"write interfaces=tl.{_OLD_NAMES[value]}"
-                raise InputError(f"{name} {brief(value)}", f"not {what}", do)
+                raise InputError(f"{name} {brief(value)}", f"this is not {what}", do)
         if self.denoise and (self.transparent or self.over_backdrop):
             what = "a transparent frame" if self.transparent else "a backdrop"
             do = f"omit denoise, or omit {what.removeprefix('a ')}"
-            raise InputError("denoise", f"{what}: the difference between two pictures cannot be denoised", do)
+            raise InputError("denoise", f"{what} needs the difference of two pictures, which cannot be denoised", do)
         if self.over_backdrop and self.caustics is not None:
-            found = "the objects of a backdrop have no mesh that light could land on"
+            found = "the objects of a backdrop have no mesh that photons could hit"
             raise InputError("caustics in front of a backdrop", found, "omit the caustics or the backdrop")

@@ -36,7 +36,7 @@ class Scattering:
     multiple: ClassVar[bool] = False
 
     def refusal(self, body: Object) -> str | None:
-        """Reason why a body cannot be shown so; None if it can."""
+        """Reason why this model cannot render a body; None if it can."""
         return None
 
 
@@ -108,18 +108,18 @@ class Diffusion(Scattering):
     def refusal(self, body: Object) -> str | None:
         """Reason: no closed solid wound outwards, or much thinner than a cell everywhere."""
         if body.sheet_thickness is not None:
-            return "it is a sheet"
+            return "the body is a sheet"
         if not body.mesh.diagnosis.sound:
-            return "its mesh is not closed"
+            return "the mesh is not closed"
         if not body.mesh.volume > 0.0:
-            return "its mesh is inside out"
+            return "the mesh is inside out"
         step = self.cell_size(body)
         if (box := float(np.prod(_own_extent(body) / step + 2.0))) > MOST_IN_BOX:
-            return f"its bounds, nearly empty, would hold {box:.2g} cells of {step:.2g} m"
+            return f"the bounding box, mostly empty, would need {box:.2g} cells of {step:.2g} m"
         # Rays that gather light on their path find it in cells alone.
         least = 1.0 if body.density is not None or (body.medium is not None and _is_volume(body, self)) else LEAST_WALL
         if body.mean_thickness < least * step:
-            return f"it is thinner than {least:g} cells everywhere; a cell is {step:.2g} m at this resolution"
+            return f"the body is everywhere thinner than {least:g} cells of {step:.2g} m"
         return None
 
 
@@ -143,7 +143,7 @@ class ScatteringLayer(Scattering):
 
     def refusal(self, body: Object) -> str | None:
         """Reason: the density varies."""
-        return None if body.density is None else "its density varies"
+        return None if body.density is None else "the density varies"
 
 
 @checked
@@ -191,7 +191,7 @@ MOST_CELL_DEPTH = 1.0
 MOST_DIFFUSED = 32
 
 #: Reason against light scattered again where density varies.
-_NO_STEPS = "its density varies, and its light needs ray marching: OpenGL 4.3 and RayMarched"
+_NO_STEPS = "the density varies, so light needs ray marching (OpenGL 4.3 and RayMarched)"
 
 
 @dataclass(frozen=True)
@@ -252,7 +252,7 @@ def choose_treatments(
     if not volumes:
         refused |= {i: _NO_STEPS for i, body in bodies.items() if _is_cloud(body)}
     if requested is None and len(bodies) - len(refused) > MOST_DIFFUSED:
-        many = f"light would diffuse in more than {MOST_DIFFUSED} bodies, which takes long"
+        many = f"more than {MOST_DIFFUSED} bodies would need diffusion, which takes long"
         refused = dict.fromkeys(bodies, many) | refused
     layer, of = ScatteringLayer(), dict[int, Treatment]()
     for i, body in bodies.items():
@@ -262,7 +262,7 @@ def choose_treatments(
             of[i] = Treatment.DIFFUSION
     if requested is not None and bodies and not of:
         i = next(iter(bodies))
-        why = refused.get(i, "this renderer draws no layers")
+        why = refused.get(i, "this renderer has no flat layers")
         raise InputError(str(requested), f"{scene.objects[i].mesh.name!r}: {why}", "use SingleScattering() instead")
     if not isinstance(chosen, Diffusion):
         return Treatments(of)
@@ -315,7 +315,7 @@ def _is_deep(body: Object, medium: Medium) -> bool:
 
 
 def _is_lit_by_ground(scene: Scene, body: int) -> bool:
-    """True if a ground below sends a body more light than what a surface instead of a volume gets wrong.
+    """True if light from the ground matters more than the error of a surface treatment.
 
     Not where it shows beams, or is viewed from within: those are in its volume.
     """
@@ -339,7 +339,7 @@ def _reduced_extinction(medium: Medium) -> Array:
 
 
 def _is_volume(body: Object, chosen: Diffusion) -> bool:
-    """True if rays gather light in a body of one density: where they see more than a skin beneath all cells."""
+    """True if light is gathered along rays in a homogeneous body, because rays see deeper than one cell."""
     if body.has_interface:
         return False
     assert body.medium is not None

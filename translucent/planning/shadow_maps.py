@@ -1,4 +1,4 @@
-"""Shadows on opaque objects: maps of what reaches them from each light, and from directions of the environment."""
+"""Shadow maps for opaque objects: transmittance from each light, and from directions of the environment."""
 
 from __future__ import annotations
 
@@ -61,12 +61,12 @@ class ShadowMaps:
 
 
 def shadows_left_out(units: int) -> tuple[Note, ...]:
-    """Note where shaders of interfaces, and of random paths, cannot read as many textures as shadows take there."""
+    """Note that shaders of interfaces and random paths have too few texture units for shadows."""
     if units >= UNITS_WITH_SHADOWS:
         return ()
     text = (
-        f"shadows on interfaces, and on opaque objects that only they show: that takes {UNITS_WITH_SHADOWS} textures, "
-        f"and this OpenGL reads {units} in a shader"
+        "no shadows on interfaces, and on objects visible only through interfaces: shadows need "
+        f"{UNITS_WITH_SHADOWS} textures in a shader, and this OpenGL allows {units}"
     )
     return (Note(NoteKind.SHADOWS, text),)
 
@@ -86,10 +86,10 @@ def shadow_passes(scene: Scene, *, over_backdrop: bool = False) -> tuple[PassSpe
     lights = f"{len(scene.lights)} {'light' if len(scene.lights) == 1 else 'lights'}"
     sky = f"{scene.environment_shadows} directions of the environment"
     sources = " and ".join(what for what, there in ((lights, scene.lights), (sky, scene.environment_shadows)) if there)
-    receivers = "the picture drawn elsewhere" if over_backdrop else count_of(opaque, "opaque object", "opaque objects")
+    receivers = "the backdrop" if over_backdrop else count_of(opaque, "opaque object", "opaque objects")
     reason = (
-        f"{sources} on {receivers}: signed depth from each, as far as the "
-        "first opaque surface, gives the color of its shadow; kept until objects or lights change"
+        f"{sources} on {receivers}: the thickness of media in front of the first opaque surface gives the color of "
+        "shadows; kept until objects or lights change"
     )
     cost = views * (1.0 + SignedDepth.cost_for(spectral=media_differ(scene)))
     return (PassSpec(PassName.SHADOW_MAPS, reason, tuple(range(len(scene.objects))), views, cost=cost),)

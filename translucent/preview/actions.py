@@ -131,7 +131,7 @@ class SetTime:
 
 @dataclass(frozen=True)
 class Keep:
-    """Keep what is on show as a snapshot, in place of one with the same name."""
+    """Store the document as a snapshot, in place of one with the same name."""
 
     name: str
 
@@ -182,7 +182,7 @@ class Pan:
 
 @dataclass(frozen=True)
 class Zoom:
-    """Get closer by a factor, to what is at a position in the picture: heights right of and below its center."""
+    """Zoom by a factor towards a point of the picture, in heights right of and below its center."""
 
     factor: float
     right: float = 0.0
@@ -242,7 +242,7 @@ def apply(document: Document, action: Action) -> Document:
             return replace(snapshots=tuple(others[name] for name in sorted(others)))
         case Recall():
             if (found := document.snapshot(action.name)) is None:
-                names = ", ".join(one.name for one in document.snapshots) or "none is kept"
+                names = ", ".join(one.name for one in document.snapshots) or "none (no snapshot exists)"
                 raise InputError(f"snapshot {action.name!r}", "no snapshot has this name", f"use one of: {names}")
             return document.seen_as(found.document)
         case ChoosePreset():
@@ -309,7 +309,7 @@ def changed_material(material: Material, name: str, value: Any) -> Material:
     if name in ("color", "distance"):
         absorption = extinction_from_colors(material.color, material.distance)
         if not (absorption <= MAX_COEFFICIENT).all():
-            found = "so short that the extinction overflows"
+            found = "the distance is so short that the extinction overflows"
             raise InputError(f"distance {material.distance:g} m", found, "check the unit of length")
         return dataclasses.replace(material, source="color", preset="", absorption=triple_of(absorption))
     if name == "absorption" or (name in _OF_PRESET and material.source == "preset"):
@@ -417,7 +417,7 @@ class History:
 
 
 def _dragged(action: SetField | SetMaterial | Assign | Place | SetLights | SetTime) -> str:
-    """What a drag changes: others are steps of undo of their own."""
+    """Part of the document that a drag changes, which makes one undo step."""
     match action:
         case SetField():
             return action.field

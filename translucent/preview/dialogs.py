@@ -79,7 +79,7 @@ class Browser:
         """Show another folder; `problem` says if there is none."""
         found = Path(os.path.normpath(self.folder / Path(folder).expanduser()))
         if not found.is_dir():
-            self.problem = f"{found}: no such folder"
+            self.problem = f"{found}: this folder does not exist"
             return
         self.folder, self.problem, self.replaced = found, "", ""
 
@@ -96,17 +96,17 @@ class Browser:
             return None
         if not self.saves:
             if not path.is_file():
-                self.problem = f"{path.name}: no such file"
+                self.problem = f"{path.name}: this file does not exist"
                 return None
             return str(path)
         if not path.suffix and self.patterns and "." in self.patterns[0]:
             path = path.with_name(path.name + self.patterns[0].removeprefix("*"))
         if not path.parent.is_dir():
-            self.problem = f"{path.parent}: no such folder"
+            self.problem = f"{path.parent}: this folder does not exist"
             return None
         if path.exists() and self.replaced != str(path):
             self.replaced = str(path)
-            self.problem = f"{path.name} is there; press Replace to write over it"
+            self.problem = f"{path.name} exists; press Replace to overwrite it"
             return None
         return str(path)
 

@@ -121,7 +121,7 @@ def _through_lens(renderer: Renderer, scene: Scene, size: Size, request: RenderR
     parts = [name for name in ("radiance", "alpha", "passed") if getattr(frame, name) is not None]
     sums = {name: np.zeros(getattr(frame, name).shape) for name in parts}
     for number, (right, down) in enumerate(shifts):
-        report(number / count, f"part {number + 1} of {count} of the lens")
+        report(number / count, f"lens sample {number + 1} of {count}")
         camera = lens.camera(scene.camera, size, number, count)
         window = camera.window or Window(0, 0, size)
         shifted = replace(window, left=window.left + float(right), top=window.top + float(down))
@@ -155,7 +155,7 @@ def write_turntable(
 
 @dataclass(eq=False)
 class Bake:
-    """Baked map, and the scene with the model painted with it.
+    """Baked map, and the scene with the model textured by it.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ class Bake:
         return f"{most:.3g}" if self.map.settings.mode == "local" else length_text(most, unit)
 
     def seen_from(self, orbit: Orbit) -> Scene:
-        """Scene of the painted model; the same object while the camera stays."""
+        """Scene of the textured model; the same object while the camera is unchanged."""
         if self._view is None or self._view[0] != orbit:
             self._view = orbit, dataclasses.replace(self.scene, camera=camera_of(orbit))
         return self._view[1]
@@ -211,7 +211,7 @@ def _bake(mesh: Mesh, options: dict[str, Any]) -> tuple[ThicknessMap, npt.NDArra
 
 
 def painted(body: Object, baked: ThicknessMap) -> Scene:
-    """Scene with the body in the false colors of a map, unshaded, in white surroundings."""
+    """Scene with the body in the false colors of a map, unshaded, in front of white."""
     values = np.where(baked.coverage, baked.values, 0.0)
     most = float(values.max(initial=0.0)) or 1.0
     colors = false_colors()[np.rint(np.clip(values / most, 0.0, 1.0) * 255).astype(np.intp)]
@@ -372,7 +372,7 @@ def python_code(recipe: Recipe) -> str:
     for added in document.lights:
         lines += [f"scene = dataclasses.replace(scene, lights=[*scene.lights, {_light_text(added)}])"]
     if look.depth_of_field:
-        lines += ["# depth of field: translucent.scene.camera.Lens gives cameras; this picture is through a pinhole"]
+        lines += ["# without depth of field; see translucent.scene.camera.Lens"]
     choices = [f"samples={document.export.samples:.0f}"]
     choices += ["denoise=True"] if document.export.denoise else []
     request = request_of(document)

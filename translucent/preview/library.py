@@ -202,7 +202,11 @@ class EnvironmentFolder:
             if self._listed is None or self._listed[0] != key:
                 names = sorted(name for name in os.listdir(self.path) if name.lower().endswith(ENVIRONMENT_SUFFIXES))
                 self._listed = key, [os.path.join(self.path, name) for name in names[:MOST_FILES]]
-                self.problem = "" if names else f"{self.path}: no {', '.join(ENVIRONMENT_SUFFIXES)} is here"
+                self.problem = (
+                    ""
+                    if names
+                    else (f"{self.path}: no file with the suffix {' or '.join(ENVIRONMENT_SUFFIXES)} in this folder")
+                )
         except OSError as error:
             self.problem = f"{self.path}: {error.strerror}"
             return []

@@ -107,9 +107,9 @@ class Measurement:
     scene: Scene | None = None
 
     def scaled(self, factor: float) -> Measurement:
-        """The same of a model so many times as large, which is measured again when it is seen."""
+        """Measurement scaled with the model, to be measured again."""
         seen = dataclasses.replace(self.seen, thickness=factor * self.seen.thickness, edges=factor * self.seen.edges)
-        return Measurement((), "the size has changed: it is measured anew", seen, self.truth)
+        return Measurement((), "the size has changed, so the picture is measured again", seen, self.truth)
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,7 +71,7 @@ def untraceable(scene: Scene, pool: Pool, lane: Lane, *, embree: bool) -> str:
     if not missing:
         return ""
     if any(lane.failed(ref(mesh)) for mesh in missing):
-        return "Rough reflections: the mesh could not be prepared for exact ones"
+        return "Reflections are approximate, because the mesh could not be prepared for ray tracing"
     mesh = missing[0]
 
     def prepare(task: Task) -> None:
@@ -82,7 +82,7 @@ def untraceable(scene: Scene, pool: Pool, lane: Lane, *, embree: bool) -> str:
             mesh_scene(mesh)
 
     lane.request(ref(mesh), "preparing reflections", prepare)
-    return "Preparing reflections in the mesh: rough preview"
+    return "The mesh is being prepared for ray tracing; until then, reflections are approximate"
 
 
 def make_normals(task: Task, pool: Pool, mesh: Mesh) -> None:
@@ -246,12 +246,12 @@ def _engine(written: float, device: str) -> tuple[GpuRenderer, CompileBudget]:
 
 
 def _quick(plan: RenderPlan) -> RenderPlan:
-    """Plan that needs the same programs: of a stand-in for its scene, with few cells for diffusion."""
+    """Plan that needs the same shader programs, but is quick to draw."""
     return dataclasses.replace(plan, scene=stand_in(plan.scene), diffusion=Diffusion(LEAST_RESOLUTION))
 
 
 def stand_in(scene: Scene) -> Scene:
-    """Scene that needs the same programs as another, and is quick to draw: boxes for meshes, and no pictures."""
+    """Scene that needs the same shader programs, but is quick to draw: boxes for meshes, and no textures."""
     return dataclasses.replace(
         scene,
         objects=[_object_like(item) for item in scene.objects],

@@ -109,7 +109,7 @@ class FrameBudget:
         return budget - min(max(taken, 0.0), (1.0 - LEAST_SHARE) * budget)
 
     def end(self, *, more: bool) -> None:
-        """End it. Where no other follows at once, the window may sleep."""
+        """End the preparation. Where no other follows at once, the window may sleep."""
         self._ended = self._clock() if more else None
 
 
@@ -268,7 +268,7 @@ class InteractiveQuality:
         at_surfaces = bool(plan.treated(Treatment.DIFFUSION))
         instead: Scattering = ScatteringLayer() if at_surfaces else SingleScattering()
         where = f"Softening light in the {workspace.document.material.preset.replace('_', ' ') or 'model'}"
-        roughly = "first guess" if at_surfaces else "no more than what is scattered once"
+        roughly = "first guess" if at_surfaces else "only light that is scattered once"
         key, lane = diffusion_key(plan), workspace.lanes["diffuse"]
         moves, self._last = key != self._last, key
         if cache.has(key):
@@ -392,7 +392,7 @@ class PathRefinement:
                 return False, False
             if self._held is None:
                 self._held = Convergence(renderer.gpu, self.plan, viewport.size)
-                self.note = "converging: the first paths"
+                self.note = "tracing the first paths"
                 return True, False
         except InputError as error:
             self.note = f"not converging: {error}"
@@ -424,11 +424,11 @@ class PathRefinement:
         self.note = f"{state}: {held.paths} paths, standard error {held.error:.2%}"
         if self._denoised:
             self.note = (
-                f"{state}: denoised at {self._denoised} paths (what is on show has no known error), {held.paths} now"
+                f"{state}: denoised after {self._denoised} paths, with an unknown error; {held.paths} paths so far"
             )
 
     def _denoise(self, held: Convergence, scene: Scene, viewport: Viewport, workspace: Workspace) -> bool:
-        """Have the noise taken out of what is there, if it is time; returns whether a picture is to come."""
+        """Start denoising the picture, if it is time; returns whether a picture will follow."""
         lane, paths = workspace.lanes["denoise"], held.paths
         key = scene, paths
         if lane.task is not None:
@@ -529,7 +529,7 @@ class PhotonRefinement:
                 return False  # nothing opaque that more could land on
             if self.light is None:
                 self.light = PhotonPicture(renderer.gpu, self.plan, viewport.size)
-                self.note = "caustics: the first photons"
+                self.note = "caustics: tracing the first photons"
                 return True
         except InputError as error:
             self.note = f"no {error}" if str(error).startswith("caustics") else f"no caustics: {error}"
@@ -561,9 +561,9 @@ class PhotonRefinement:
                 self.note = f"caustics: {caustics.in_media:,} photons in media"
             return True
         if lane.failed(key):
-            self.note = "no caustics: what photons light in media could not be solved for"
+            self.note = "no caustics: the light of photons in media could not be computed"
         elif lane.task is None:
-            self.note = "caustics: photons in media first"
+            self.note = "caustics: tracing photons in media"
             given = workspace.pool, cache, plan
             lane.request(key, "photons in media", lambda task: solve_aside(task, *given))
         return False
@@ -582,7 +582,7 @@ class PhotonRefinement:
         return not self.drawing and (self._in_picture >= MOST_PHOTONS or self._noise < QUIET)
 
     def take_over(self, viewport: Viewport, stride: int, samples: int) -> bool:
-        """Put the picture that is drawn aside on show once it is whole; returns whether it was put there.
+        """Replace the visible picture by the one drawn in the background, once it is complete; returns whether it did.
 
         Where pictures take long, the first whole one takes over, and edges become smooth after that. When it is as good
         as it gets with these photons, more are followed.

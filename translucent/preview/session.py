@@ -131,7 +131,7 @@ def _snapshot(entry: dict[str, Any], where: str) -> Snapshot:
     if not isinstance(name, str) or not name or "snapshots" in fields:
         raise InputError(
             f"{where}, [[snapshots]]",
-            f"the name is {name!r}, or a snapshot contains snapshots",
+            "a snapshot has no name, or contains other snapshots",
             "give each snapshot a name",
         )
     return Snapshot(name, from_table(fields, f"{where}, snapshot {name}"))

@@ -160,5 +160,5 @@ def problem(error: Exception) -> str:
     if isinstance(error, TranslucentError):
         return str(error)
     if isinstance(error, MemoryError):
-        return "the memory is full; close other programs, or use a smaller model or picture"
+        return "not enough memory; close other programs, or use a smaller model or picture"
     return f"unexpected {type(error).__name__}: {error or 'no details'}"

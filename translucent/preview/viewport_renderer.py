@@ -268,9 +268,9 @@ class ViewportRenderer:
         self._seen_from = scene.camera.pose
         self.state = "moving" if factor == 1.0 else f"moving, {1 / factor:.0%} of the resolution"
         if request.interfaces is not self.quality.request.interfaces:
-            self.simpler = "Rough reflections while the picture moves"
+            self.simpler = "Approximate reflections while the view moves"
         elif shadows is not None:
-            self.simpler = "Rough shadows while the picture moves"
+            self.simpler = "Approximate shadows while the view moves"
         self.presenter.shown = ()
         return True
 
@@ -381,16 +381,16 @@ class ViewportRenderer:
             self._requested = compiler.request("preparing the picture", self._drawn_plans, then)
 
     def _stand_in(self, workspace: Workspace, scene: Scene) -> None:
-        """Show what looks like the materials of a scene meanwhile, or where no picture is on show, the last one."""
+        """Show a quick preview picture, or the last picture, while programs compile."""
         display, look = workspace.document.display, workspace.document.look
-        self.state = "preparing the new picture: this is the last one"
+        self.state = "preparing the new picture; the old picture is still visible"
         if display.mode != "picture" or display.compare != "off" or workspace.shown_bake is not None:
             return
         with self.current():
             moved = self._seen_from is not None and not np.array_equal(self._seen_from, scene.camera.pose)
             self.viewport.stand_in(scene, (look.exposure, tone_of(look, scene)), whole=moved)
         self.presenter.shown = ()
-        self.state = "preparing the new picture: a stand-in"
+        self.state = "preparing the new picture; a simple preview is visible"
 
     def _take_compiled(self, workspace: Workspace, found: Compiled, missing: ProgramName | None = None) -> None:
         """Let the context build the programs found, and the one that was `missing`, even if it was not."""
@@ -399,7 +399,7 @@ class ViewportRenderer:
         budget.elsewhere |= (found.programs or set()) | ({missing} if missing is not None else set())
         if found.programs is None:
             budget.postpones = False
-            text = f"shaders are compiled in the window, which stands still meanwhile: {found.problem}"
+            text = f"shaders are compiled in the window, so the window does not respond for a while: {found.problem}"
             workspace.tell("warning", text)
 
     def reload(self, workspace: Workspace) -> None:
@@ -506,7 +506,7 @@ class Presenter:
         return self._alone
 
     def present(self, viewport: Viewport, *, changed: bool, last: bool) -> bool:
-        """Show the samples so far, unless they are on show, or can be shown later; returns whether they have to be.
+        """Show the samples so far, if they are new and time allows; returns whether they must be shown.
 
         Parameters
         ----------

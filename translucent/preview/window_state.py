@@ -377,7 +377,10 @@ class WindowState:
 
         def give(number: int | None) -> None:
             if number is None:
-                self.work.tell("warning", f"{name} is not assigned: nothing is there; drop it on an object")
+                self.work.tell(
+                    "warning",
+                    f"{name} was not assigned, because no object is at this point; drop the preset on an object",
+                )
             else:
                 self.choose_preset(name, number if len(self.objects) > 1 else None)
 
@@ -392,7 +395,7 @@ class WindowState:
             return False
         self.work.tell("info", f"saved {path}")
         if left_out:
-            self.work.tell("warning", f"no preset keeps: {', '.join(left_out)}")
+            self.work.tell("warning", f"a preset cannot store: {', '.join(left_out)}")
         return True
 
     def pick(self, position: tuple[float, float], then: Callable[[int | None], None]) -> None:
@@ -448,7 +451,7 @@ class WindowState:
         self._require(number)
         hidden = set(self.work.document.hidden) ^ {number}
         if hidden >= set(range(len(self.objects))):
-            found = "it is the only one on show"
+            found = "no other object is visible"
             return self.work.refuse(
                 InputError(
                     f"hiding {self.name_of(number)}",
@@ -539,7 +542,7 @@ class WindowState:
             self.work.open(dataclasses.replace(self.work.document.model, path=models[0]))
         if others := [*models[1:], *lights[1:]]:
             names = ", ".join(Path(path).name for path in others[:3]) + (", ..." if len(others) > 3 else "")
-            text = f"{len(others)} dropped files are left out, as one model is shown at a time: {names}"
+            text = f"{len(others)} dropped files are ignored, because the window shows one model at a time: {names}"
             self.work.tell("warning", text)
 
     def use_file(self, kind: str, path: str) -> None:
@@ -566,14 +569,14 @@ class WindowState:
             case "png" | "exr" | "turntable":
                 self._export(kind, path)
             case _:
-                found = f"{kind!r} is nothing to read or write"
+                found = f"{kind!r} is not a known file question"
                 work.refuse(InputError(f"file {path!r}", found, f"use {', '.join(QUESTIONS)}"))
 
     def _save_medium(self, path: str) -> None:
         """Write the model's file with the medium in its materials; other types of files have none to keep."""
         source, document, outside = self.get("model.path"), self.work.document, self.work.allow_outside
         if Path(source).suffix.lower() not in SUFFIXES:
-            do = "copy the medium as glTF, or export the model as .glb first"
+            do = "copy the medium as glTF, or convert the model to .glb first"
             return self.work.refuse(InputError(f"saving into {path!r}", f"{Path(source).name} is no glTF file", do))
         named = [(self.objects[one.object].mesh.name, one.material) for one in document.assigned]
         whole = [] if named and document.material.source == "file" else [(None, document.material)]
@@ -612,7 +615,10 @@ class WindowState:
         recipe = Recipe(work.document, work.loaded, scene, self.view.viewport.size, self._caustics(scene))
         text, left_out = (python_code(recipe), []) if kind == "python" else command_line(recipe)
         if left_out:
-            work.tell("warning", f"no option of the copied command says: {', '.join(left_out)}; Python does")
+            work.tell(
+                "warning",
+                f"the copied command leaves out: {', '.join(left_out)}; the Python script contains these settings",
+            )
         else:
             work.tell("info", "copied as Python" if kind == "python" else "copied as a command")
         imgui.set_clipboard_text(text)

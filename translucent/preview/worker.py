@@ -123,7 +123,7 @@ class WorkerMessage:
                 return cls(stream.getvalue(), tuple(spans), os.dup(file.fileno()))
         except OSError as error:
             size = size_text(sum(array.nbytes for array in arrays))
-            found = f"{tempfile.gettempdir()} has no room for {size} of meshes and pictures ({error.strerror})"
+            found = f"{tempfile.gettempdir()} has no space for {size} of meshes and pictures ({error.strerror})"
             raise RenderError(
                 "work of another process", found, "free some disk space, or set TMPDIR to another folder"
             ) from error
@@ -261,7 +261,7 @@ class Pool:
             self._end(worker)
             if self._closed:
                 raise CancelledError from None
-            found = f"its process ended with status {status}, as when the memory is full"
+            found = f"the worker process ended with status {status}, perhaps because the memory was full"
             raise RenderError(task.name, found, "close other programs, or use smaller settings") from None
         except CancelledError:
             self._return(worker) if worker.stop() else self._end(worker)

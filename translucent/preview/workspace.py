@@ -249,7 +249,7 @@ class Workspace:
 
     @property
     def shown_bake(self) -> Bake | None:
-        """Map that the model is painted with; None if it shows its medium."""
+        """Baked map displayed on the model; None if the model shows its medium."""
         return self.bake if self.show_bake else None
 
     @property
@@ -266,7 +266,7 @@ class Workspace:
 
     @property
     def prepares(self) -> bool:
-        """True if processes prepare what the picture waits for, which may take all the memory that there is."""
+        """True if worker processes prepare the picture, which may take all memory."""
         lanes = self.lanes["trace"], self.compiler.lane
         return self.relights or any(lane.task is not None and lane.task.name for lane in lanes)
 
@@ -369,7 +369,7 @@ class Workspace:
     def write(self, path: str, work: Callable[[Task], object]) -> None:
         """Write a file in the background."""
         if (other := self.lanes["write"].task) is not None:
-            found = f"{other.name} is under way"
+            found = f"another task is still running: {other.name}"
             return self.refuse(
                 RenderError(
                     f"the file {path!r} has not been written yet",
@@ -459,7 +459,7 @@ class Workspace:
         if self.loaded is None:
             return
         if not self.document.shown_among(len(self.loaded.scene.objects)):
-            self.tell("warning", "all objects of the model were hidden: they are shown")
+            self.tell("warning", "all objects of the model were hidden, so all are shown again")
             visible = dataclasses.replace(self.document, hidden=())
             self.history = dataclasses.replace(self.history, present=visible)
         present = self.document

@@ -485,7 +485,7 @@ def _left_out(scene: Scene) -> tuple[Note, ...]:
     ]
     if not scene.lights or not polished:
         return ()
-    text = "light that polished interfaces refract or reflect on its way from lights: in media, and as caustics"
+    text = "caustics and refracted light of lights without a size are missing"
     return (Note(NoteKind.LIGHTS_LEFT_OUT, text),)
 
 

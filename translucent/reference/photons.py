@@ -29,7 +29,7 @@ _CONTACT = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class LandedPhotons:
-    """Photons that interfaces have bent or mirrored, where they have landed on opaque objects.
+    """Photons that were refracted or reflected by interfaces and landed on opaque objects.
 
     Attributes
     ----------

@@ -57,7 +57,7 @@ class RayEnds:
         self.light, self.scene, self.aspect = light, light.scene, aspect
 
     def radiance(self, live: LiveRays, wall: OpaqueHits) -> Array:
-        """(k, 3): of the opaque surfaces that stop ray segments, or where none does of the environment."""
+        """(k, 3): radiance of the opaque surfaces that stop ray segments, or of the environment."""
         radiance = reflected_radiance(self.scene, live.rays, wall, self.light.on_opaque)
         free = np.flatnonzero(np.isinf(wall.distance))
         radiance[free] = self._environment(live.where(free))

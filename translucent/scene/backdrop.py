@@ -77,7 +77,7 @@ class Backdrop(Frozen):
         if self.coverage is not None:
             coverage = np.array(self.coverage, order="C")
             if coverage.shape != depth.shape or coverage.dtype != bool:
-                found = f"coverage of shape {coverage.shape} and type {coverage.dtype}"
+                found = f"the coverage has the shape {coverage.shape} and the type {coverage.dtype}"
                 raise InputError("backdrop", found, f"use an array of shape {depth.shape} and type bool")
             self._freeze("coverage", coverage)
         if self.ambient is not None:

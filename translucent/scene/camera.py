@@ -216,7 +216,7 @@ class Camera(Frozen):
         return (2 * window.left + size[0] - width) / size[0], (height - 2 * window.top - size[1]) / size[1]
 
     def beyond(self, size: tuple[int, int]) -> tuple[float, float, int, int]:
-        """Pixels of the whole picture to the left of and above the view, and how many more it has across and down."""
+        """Pixels of the whole picture left of and above the view, and the remaining pixels across and down."""
         if (window := self.window) is None:
             return 0, 0, 0, 0
         return window.left, window.top, window.whole[0] - size[0], window.whole[1] - size[1]

@@ -61,17 +61,17 @@ def read_radiance(path: str | Path) -> npt.NDArray[np.float32]:
 
 def _header(path: str | Path, data: bytes) -> _Header:
     if not data.startswith(b"#?"):
-        raise _refused(path, "not a Radiance picture: it does not begin with #?RADIANCE", "give an .hdr file")
+        raise _refused(path, "the file does not begin with #?RADIANCE", "give an .hdr file")
     text, blank, rest = data.partition(b"\n\n")
     line, end, _ = rest.partition(b"\n")
     match = _RESOLUTION.fullmatch(line)
     if not (blank and end and match) or match[2] == match[5]:
-        raise _refused(path, "its header has no size", "save it again")
+        raise _refused(path, "the header has no picture size", "save it again")
     exposure = 1.0
     for entry in text.split(b"\n")[1:]:
         name, _, value = entry.partition(b"=")
         if name.strip() == b"FORMAT" and value.strip() != b"32-bit_rle_rgbe":
-            raise _refused(path, f"format {value.strip().decode(errors='replace')}", "save it as RGBE")
+            raise _refused(path, f"the format is {value.strip().decode(errors='replace')}", "save it as RGBE")
         if name.strip() == b"EXPOSURE":
             exposure *= _exposure(path, value)
     rows, columns = int(match[3]), int(match[6])
@@ -88,7 +88,7 @@ def _exposure(path: str | Path, value: bytes) -> float:
     except ValueError:
         exposure = 0.0
     if not 1e-30 < exposure < 1e30:
-        raise _refused(path, f"exposure {value.strip().decode(errors='replace')}", "save it again")
+        raise _refused(path, f"the exposure is {value.strip().decode(errors='replace')}", "save it again")
     return exposure
 
 
@@ -114,7 +114,7 @@ def _by_channel(path: str | Path, data: Bytes, rows: int, columns: int) -> Bytes
         line = bytearray()
         while len(line) < 4 * columns:
             if at + 1 >= len(source):
-                raise _refused(path, f"it ends in row {row} of {rows}", "copy the file again")
+                raise _refused(path, f"the file ends in row {row} of {rows}", "copy the file again")
             count = source[at]
             if count > 128:
                 line += source[at + 1 : at + 2] * (count - 128)
@@ -123,7 +123,7 @@ def _by_channel(path: str | Path, data: Bytes, rows: int, columns: int) -> Bytes
                 line += source[at + 1 : at + 1 + count]
                 at += 1 + count
                 if count == 0 or at > len(source):
-                    raise _refused(path, f"it ends or is broken in row {row} of {rows}", "copy the file again")
+                    raise _refused(path, f"the file ends, or is broken, in row {row} of {rows}", "copy the file again")
         if len(line) != 4 * columns:
             raise _refused(path, f"row {row} of {rows} is too long", "copy the file again")
         stored[row] = np.frombuffer(line, dtype=np.uint8).reshape(4, columns)
@@ -139,12 +139,12 @@ def _by_pixel(path: str | Path, data: Bytes, count: int) -> Bytes:
     for i in np.flatnonzero(repeats).tolist():
         digit = digit + 1 if i > 0 and repeats[i - 1] else 0
         if i == 0 or digit > 3:
-            raise _refused(path, "it repeats a pixel that it does not have", "copy the file again")
+            raise _refused(path, "the file repeats a pixel before the first pixel", "copy the file again")
         times[i] = int(words[i, 3]) << (8 * digit)
     ends = np.cumsum(times)
     enough = int(np.searchsorted(ends, count)) + 1
     if enough > len(words):
-        raise _refused(path, f"it ends after {int(times.sum())} of {count} pixels", "copy the file again")
+        raise _refused(path, f"the file ends after {int(times.sum())} of {count} pixels", "copy the file again")
     times[enough - 1] -= ends[enough - 1] - count  # a damaged run may be of billions
     # A repetition repeats the last pixel before it.
     last = np.maximum.accumulate(np.where(repeats, 0, np.arange(len(words))))

@@ -1,4 +1,4 @@
-"""Grounds: flat objects that mirror what stands on them, or catch its shadows."""
+"""Grounds: flat objects that reflect the objects on them, or catch their shadows."""
 
 from __future__ import annotations
 

@@ -124,7 +124,7 @@ class Object(Frozen):
         if self.density is not None:
             _require_type("density of an object", self.density, get_args(Density), "use for example tl.DensityGrid")
             if self.medium is None or self.sheet_thickness is not None:
-                what = "opaque" if self.medium is None else "a sheet, which has no inside"
+                what = "opaque" if self.medium is None else "a thin-walled sheet without an inside"
                 raise InputError(
                     f"density of {self.mesh.name!r}",
                     f"the object is {what}",
@@ -146,7 +146,7 @@ class Object(Frozen):
             found = f"a {'medium' if self.medium is not None else 'surface'} is given, too"
             raise InputError(requested, found, "give either the material, or the medium and the surface")
         if not isinstance(material, Preset | str):
-            do = 'give a preset or its name, such as "wax"; of a color, tl.showcase(mesh, color, distance)'
+            do = 'give a preset or its name, such as "wax"; for a color, use tl.showcase(mesh, color, distance)'
             raise InputError(requested, f"{type(material).__name__}", do)
         made = preset(material) if isinstance(material, str) else material
         object.__setattr__(self, "medium", made.medium)
@@ -166,7 +166,7 @@ class Object(Frozen):
             )
         if surface.opacity is not None and (self.medium is None or self.sheet_thickness is None):
             what = "opaque" if self.medium is None else "a solid"
-            do = "give it a clear medium and a sheet_thickness, or no opacity"
+            do = "give the object a clear medium and a sheet_thickness, or no opacity"
             raise InputError(
                 f"opacity of {self.mesh.name!r}",
                 f"the object is {what}, and only thin-walled sheets can have an opacity",
@@ -367,7 +367,7 @@ class Scene(Frozen):
         return found
 
     def _repr_html_(self) -> str:
-        """The same, for front ends that know no bundles."""
+        """HTML of the scene for notebooks without rich bundles."""
         return str(self._repr_mimebundle_()[0]["text/html"])
 
     @cached_property
@@ -425,7 +425,7 @@ class Scene(Frozen):
 
     @cached_property
     def shown(self) -> tuple[Object, ...]:
-        """Objects that a picture is of: without shadow catchers, unless there is nothing else."""
+        """Objects of the picture, without shadow catchers, unless there are no others."""
         return tuple(item for item in self.objects if not item.shadow_catcher) or tuple(self.objects)
 
     @cached_property

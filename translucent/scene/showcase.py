@@ -133,7 +133,7 @@ def _body(
         color = None
     if isinstance(medium, str) and (color is None or medium in presets()):
         return Object(mesh, material=medium)
-    do = f"give the metres after which white light has it: showcase(mesh, {brief(medium)}, 0.02)"
+    do = f"give the distance in metres after which white light has this color: showcase(mesh, {brief(medium)}, 0.02)"
     raise InputError(f"showcase medium {brief(medium)}", "a color needs a distance", do)
 
 
@@ -178,7 +178,7 @@ def named_environment(name: str, rotation: float = 0.0) -> Environment:
     except InputError:
         if not (close := close_names(name.partition(",")[0].strip().lower(), ENVIRONMENT_NAMES)):
             raise
-        found = f"neither one of {', '.join(ENVIRONMENT_NAMES)} nor a color or a picture"
+        found = f"not a color, not a picture, and none of {', '.join(ENVIRONMENT_NAMES)}"
         raise InputError(f"environment {name!r}", found, did_you_mean(close)) from None
 
 
@@ -297,7 +297,7 @@ def objects_named(scene: Scene, name: str) -> tuple[Object, ...]:
 
 
 def fillable(scene: Scene) -> tuple[Object, ...]:
-    """Objects to fill with a medium if none is named: all that light enters, or else all.
+    """Objects to fill with a medium if none is named: all translucent objects, or else all objects.
 
     Layers that cover a fraction of what is behind them are among them only where there is nothing else.
     """

@@ -1,4 +1,4 @@
-"""Stages: what a model stands on and before, and what lights it there."""
+"""Stages: ground, backdrop and lights around a model."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class KeyLight:
 
 @dataclass(frozen=True)
 class Stage:
-    """Stages: what a model stands on and before.
+    """Stage: ground, backdrop and lights around a model.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ def stage_named(name: str) -> Stage | None:
     if name not in STAGES:
         names = (NO_STAGE, *STAGES)
         close = close_names(name, names)
-        do = did_you_mean(close) if close else f"give one of {', '.join(names)}"
+        do = did_you_mean(close) if close else f"use one of {', '.join(names)}"
         raise InputError(f"stage {name!r}", "no stage has this name", do)
     return STAGES[name]
 
@@ -203,7 +203,7 @@ def staged(
     if chosen is None:
         return scene
     if len(scene.shown) < len(scene.objects):
-        do = 'make it without one, as by tl.showcase(mesh, medium, stage="none")'
+        do = 'use a scene without a stage, such as tl.showcase(mesh, medium, stage="none")'
         raise InputError("a stage for a scene", "the scene already has a ground that catches shadows", do)
     axes = view_axes(scene.camera) @ _about_y(turn).T
     surface = _ground_surface(chosen, ground)

@@ -194,7 +194,7 @@ def _color(field: str, color: ColorLike, most: float) -> Array:
     except (TypeError, ValueError):
         values = np.zeros(0)
     if values.shape != (3,) or not ((values >= 0) & (values <= most)).all():
-        found = f"not three numbers in 0 to {most:g}"
+        found = f"the value must be three numbers in 0 to {most:g}"
         raise InputError(f"surface {field} {color!r}", found, "use a color such as (1, 0.9, 0.8)")
     values.setflags(write=False)
     return values

@@ -55,7 +55,7 @@ def with_priorities(scene: AnyScene) -> tuple[AnyScene, tuple[str, ...]]:
     for priority, i in enumerate(reversed(order)):
         objects[i] = dataclasses.replace(objects[i], priority=priority)
     made = dataclasses.replace(scene, objects=objects, overlap="priority")
-    remark = f"where bodies touch, {', '.join(said)}; a priority for each in a .toml scene says otherwise"
+    remark = f"where bodies overlap, {', '.join(said)}; to change this, write priorities in a .toml scene"
     return made, ((remark,) if said else ())
 
 

@@ -1,1 +1,1 @@
-"""Audit of glTF materials that light passes: what a file states against what its meshes are, and its repair."""
+"""Audit of translucent glTF materials: stated thickness against the meshes, and repair of the file."""

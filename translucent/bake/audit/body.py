@@ -1,4 +1,4 @@
-"""Bodies of a glTF file, measured: thickness along normals and along views, beside what their materials state.
+"""Measured bodies of a glTF file: true thickness along normals and view rays, and the stated thickness.
 
 All lengths are in units of the mesh, in its own space, where glTF states thickness. There a stated length and a true
 one in the same direction compare as they are: a node scales both alike. Views are straight rays from all sides, each
@@ -43,7 +43,7 @@ class Placement:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """Body, measured.
+    """Body of a glTF file with its measured and its stated thickness.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class Body:
         return np.asarray(np.linalg.norm(self.views @ self.placements[0].matrix[:3, :3].T, axis=1))
 
     def world_normals(self) -> Array:
-        """(n,): the same along the normals."""
+        """(n,): world length of 1 in mesh space along each normal."""
         return np.asarray(np.linalg.norm(self.normals @ self.placements[0].matrix[:3, :3].T, axis=1))
 
     def placed(self, placement: Placement) -> Array:
@@ -195,13 +195,13 @@ def _points(surface: PreparedMesh, first: int, count: int) -> tuple[Points, Arra
 def _stated(
     file: GltfFile, material: GltfMaterial, key: PrimitiveKey, mesh: Mesh, weights: Array, faces: Integers
 ) -> tuple[Array, str]:
-    """(n,): stated thickness, and what hinders reading it."""
+    """(n,): stated thickness, and the reason if its texture cannot be read."""
     constant = np.full(len(faces), material.thickness)
     if not material.has_thickness_texture:
         return constant, ""
     number = material.thickness_transform.tex_coord
     if f"TEXCOORD_{number}" not in file.item("meshes", key[0])["primitives"][key[1]]["attributes"]:
-        return constant, f"the primitive has no TEXCOORD_{number}, at which the thickness texture is read"
+        return constant, f"the primitive has no TEXCOORD_{number}, the texture coordinates of the thickness texture"
     uv = read_primitive(file, key, 1.0, number).uv
     assert uv is not None
     corners = _uv_corners(file, key, number, mesh)[faces]

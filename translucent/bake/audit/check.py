@@ -1,4 +1,4 @@
-"""Audit of a glTF file: every material that light passes, every body that it fills; and the repair of what it finds.
+"""Audit of a glTF file: all translucent materials and the bodies that they fill; and repair of the file.
 
 Repaired is what the file alone determines. Baked, into a material of its own, is each primitive whose thickness is
 wrong; metallicFactor of what transmits becomes 0, and doubleSided of volumes goes. Everything else stays as it is: what
@@ -65,7 +65,7 @@ MOST_HIDDEN, ENOUGH_TEXELS = 0.5, 4
 
 @checked
 def check_materials(path: str | Path, *, allow_outside: bool = False) -> MaterialCheck:
-    """Check whether a glTF file's translucent materials say what its meshes are.
+    """Check the thickness and attenuation of a glTF file's translucent materials against its meshes.
 
     Compared are thicknessFactor and thicknessTexture with the true thickness of each mesh, by rays along its normals
     and along views; the attenuation, at that thickness; holes, winding and bodies that cross; scales of nodes; and
@@ -113,11 +113,11 @@ def check_file(file: GltfFile) -> MaterialCheck:
 
 
 def _gathered(found: list[MaterialFinding]) -> list[MaterialFinding]:
-    """Findings with a single one about the whole file, which counts its bodies."""
+    """Findings with one finding about unusual sizes in place of one per body."""
     sizes = [one for one in found if one.code == "size-unusual"]
     if len(sizes) < 2:
         return found
-    first = dataclasses.replace(sizes[0], where=f"{sizes[0].where}, and {len(sizes) - 1} other bodies alike")
+    first = dataclasses.replace(sizes[0], where=f"{sizes[0].where}, and {len(sizes) - 1} more bodies")
     return [one for one in found if one.code != "size-unusual"] + [first]
 
 
@@ -188,7 +188,7 @@ def fix_materials(
     threads: int | None = None,
     allow_outside: bool = False,
 ) -> MaterialCheck:
-    """Write a copy of a glTF file with the thickness of its meshes baked where what it states is wrong.
+    """Write a copy of a glTF file in which wrong thicknesses are replaced by baked ones.
 
     Parameters
     ----------
@@ -245,21 +245,21 @@ def fix_materials(
 
 
 def _hidden(before: MaterialFinding, baked: ThicknessMap) -> Iterator[MaterialFinding]:
-    """Finding about a body whose faces have hardly any texels of their own in the map that was baked for it."""
+    """Finding about a body most of whose faces have no texels of their own in the baked map."""
     faces = len(baked.mesh.faces)
     fraction = baked.report.faces_without_texel / faces
     if fraction < MOST_HIDDEN or baked.values.size < ENOUGH_TEXELS * faces:
         return
     text = (
-        f"{fraction:.0%} of the faces have no texel in the map that was baked: they are too small in UV, or lie below "
-        "others there, and show the thickness of those"
+        f"{fraction:.0%} of the faces have no texel in the baked map: these faces are too small in UV space, or "
+        "overlap other faces there"
     )
-    do = "unwrap the mesh so that each face has an area of its own in UV, or give it no UVs: --fix makes them then"
+    do = "unwrap the mesh without overlaps, or remove its UVs: --fix then makes new UVs"
     yield dataclasses.replace(before, severity="error", code="map-without-texels", text=text, do=do)
 
 
 def _mend(builder: GlbBuilder, index: int) -> None:
-    """Let a material transmit, without its back sides."""
+    """Make a material transmissive and single-sided."""
     material = GltfFile(Path(), builder.tree).item("materials", index)
     extensions = material.get("extensions", {})
     if extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0) > 0:

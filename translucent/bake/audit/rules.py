@@ -162,36 +162,42 @@ class MaterialCheck:
 
 
 def material_findings(material: GltfMaterial, entry: Json) -> Iterator[MaterialFinding]:
-    """Findings about what a material states by itself."""
+    """Findings about a material alone, without its meshes."""
     extensions = entry.get("extensions", {})
     for code, severity, text, do in (*_transport(material, entry, extensions), *_optics(material)):
         yield MaterialFinding(severity, code, material_name(material), text, do, material.index)
 
 
 def _transport(material: GltfMaterial, entry: Json, extensions: Json) -> Iterator[_Told]:
-    """Rules of how light gets in at all."""
+    """Rules about transmission: whether light enters the material at all."""
     surface = entry.get("pbrMetallicRoughness", {})
     metallic = surface.get("metallicFactor", 1.0)
     if material.transmission > 0 and metallic == 1 and "metallicRoughnessTexture" not in surface:
-        reported = "is 1" if "metallicFactor" in surface else "is not stated, and 1 by default"
-        text = f"metallicFactor {reported}: metal transmits nothing, and viewers draw it black or as metal"
-        yield "metal", "error", text, "write metallicFactor 0 (--fix does)"
+        reported = "is 1" if "metallicFactor" in surface else "is missing, so it is 1 by default"
+        text = f"metallicFactor {reported}: metals transmit no light, so viewers draw this material as metal or black"
+        yield "metal", "error", text, "set metallicFactor to 0 (--fix does)"
     if material.has_volume and not material.transmits:
-        text = f"{VOLUME} without {TRANSMISSION}, or with a factor of 0: no light enters, and it is drawn opaque"
+        text = f"{VOLUME} without {TRANSMISSION}, or with a factor of 0: no light enters, so the material is opaque"
         severity: Severity = "warning" if np.isfinite(material.attenuation_distance) else "note"
         yield "no-light-enters", severity, text, f"add {TRANSMISSION}, or remove the volume"
     if entry.get("doubleSided") is True and material.thickness > 0:
-        text = "doubleSided has no effect on the boundary of a volume, and some viewers draw its back, too"
-        yield "double-sided", "warning", text, "remove it (--fix does)"
+        text = "doubleSided has no effect on the boundary of a volume, but some viewers also draw the back faces"
+        yield "double-sided", "warning", text, "remove doubleSided (--fix does)"
     for name in DRAFTS.values():
         if name in extensions and material.has_volume:
             text = (
-                f"{name} is a draft: viewers that do not know it take all extinction for absorption, and show it darker"
+                f"{name} is a draft: viewers that do not support it treat scattering as absorption, and show darker "
+                "colors"
             )
-            yield "draft-extension", "note", text, "look at it without the extension, too"
+            yield "draft-extension", "note", text, "also check the material in a viewer without this extension"
     for name in EXCLUDED:
         if name in extensions and material.has_volume:
-            yield "excluded-extension", "error", f"{name} must not be used with {VOLUME}", "remove one of them"
+            yield (
+                "excluded-extension",
+                "error",
+                f"{name} must not be used with {VOLUME}",
+                "remove one of them",
+            )
 
 
 def _optics(material: GltfMaterial) -> Iterator[_Told]:
@@ -199,24 +205,34 @@ def _optics(material: GltfMaterial) -> Iterator[_Told]:
     black = [c for c, value in zip(("red", "green", "blue"), material.attenuation_color, strict=True) if value == 0]
     if black and np.isfinite(material.attenuation_distance):
         text = (
-            f"attenuationColor {' and '.join(black)} is 0, whose logarithm is infinite: viewers show black, clamp it "
-            f"at {BLACKEST:g} (Filament), or keep it white where the thickness is 0 (Khronos)"
+            f"attenuationColor {' and '.join(black)} is 0, so the extinction is infinite: some viewers show black, "
+            f"Filament uses {BLACKEST:g}, and the Khronos viewer shows white where the thickness is 0"
         )
-        yield "attenuation-zero", "warning", text, "write a small value, such as 0.001"
+        yield "attenuation-zero", "warning", text, "use a small value, such as 0.001"
     if not material.transmits:
         return
     if material.ior == 1:
-        text = "ior 1: nothing is mirrored and nothing bends, and three.js ignores its roughness in what passes"
-        yield "ior-one", "note", text, "write the ior of the matter (water 1.33, glass 1.5), unless this is meant"
+        text = "ior is 1: nothing is reflected or refracted, and three.js ignores the roughness in transmission"
+        yield (
+            "ior-one",
+            "note",
+            text,
+            "set the real ior (water 1.33, glass 1.5), unless 1 is intended",
+        )
     elif material.ior == 0:
-        yield "ior-zero", "note", "ior 0 is for materials of another workflow", "write the ior of the matter"
+        yield (
+            "ior-zero",
+            "note",
+            "ior 0 is for specular-glossiness materials",
+            "set the real ior",
+        )
     elif material.ior > LARGEST_IOR:
-        text = f"ior {material.ior:g} is more than that of any clear matter"
-        yield "ior-large", "warning", text, "check it: diamond has 2.42"
+        text = f"ior {material.ior:g} is higher than that of any transparent material"
+        yield "ior-large", "warning", text, "check the ior: even diamond has only 2.42"
 
 
 def scale_findings(body: Body) -> Iterator[MaterialFinding]:
-    """Findings about nodes that stretch a body unevenly: viewers get its thickness wrong there."""
+    """Findings about nodes with a non-uniform scale, for which viewers compute a wrong thickness."""
     if body.material.thickness == 0:
         return
     for placement in body.placements:
@@ -225,14 +241,14 @@ def scale_findings(body: Body) -> Iterator[MaterialFinding]:
             continue
         where = f"{material_name(body.material)}, mesh {body.name!r}, node {placement.name!r}"
         text = (
-            "the node stretches the mesh unevenly: three.js, the Khronos viewer and PlayCanvas, which scale directions "
-            f"of the world by the lengths of the matrix's columns, take {least:.2f} to {most:.2f} of the length"
+            f"the node has a non-uniform scale: three.js, the Khronos viewer and PlayCanvas then use {least:.2f} to "
+            f"{most:.2f} times the true length"
         )
         yield _found(body, "warning", "scale-uneven", text, "apply the scale to the vertices", where)
 
 
 def scale_errors(matrix: Array) -> tuple[float, float]:
-    """Smallest and largest ratio of a world length as viewers scale it to the true one, over all directions.
+    """Smallest and largest ratio of the length that viewers compute to the true length, over all directions.
 
     They take |s * v| for a world direction v, with s the lengths of the matrix's columns; true is 1 / |M^-1 v|.
     """
@@ -256,32 +272,32 @@ def mesh_findings(file: GltfFile, body: Body) -> Iterator[MaterialFinding]:
         count = found.open_edges.count
         text = (
             f"the mesh has holes ({count} open edge{'s' if count != 1 else ''}), and {body.escaped:.1%} of the rays "
-            "find no exit: a volume must be closed, and ray tracers leak"
+            "find no exit: a volume must be closed, or ray tracers show errors"
         )
-        do = "close it; or, if a sheet is meant, write thicknessFactor 0 and tint it by baseColorFactor"
+        do = "close the mesh; for a thin sheet, set thicknessFactor to 0 and color it by baseColorFactor"
         severity: Severity = "error" if body.escaped > LEAKS else "warning"
         yield _found(body, severity, "open-mesh", text, do)
     elif body.escaped > LEAKS:
         text = f"{body.escaped:.1%} of the rays find no exit, although the mesh is closed: parts of it are inside out"
-        do = "turn these parts, or split what crosses itself"
+        do = "flip these parts, or split the mesh where it intersects itself"
         yield _found(body, "warning", "inside-out", text, do)
     yield from _winding(file, body)
 
 
 def _winding(file: GltfFile, body: Body) -> Iterator[MaterialFinding]:
-    """Findings about the winding as the file has it, before it is mended here."""
+    """Findings about the winding of faces in the file, before any repair."""
     primitive = primitives(file, file.item("meshes", body.key[0]))[body.key[1]]
     plain = {**primitive, "attributes": {"POSITION": primitive["attributes"].get("POSITION")}}
     raw = raw_mesh(Accessors(file), plain, body.name)
     if raw is None:
         return
-    found, do = raw.diagnosis, "make the winding consistent, with normals outwards"
+    found, do = raw.diagnosis, "make the winding consistent, with all normals outwards"
     if found.mixed_edges:
-        text = f"faces disagree about their winding at {found.mixed_edges.count} edges: viewers cull some from outside"
+        text = f"faces have inconsistent winding at {found.mixed_edges.count} edges: viewers cull some of these faces"
     elif found.inverted:
-        text = "all faces look inwards: viewers show the far side, or nothing"
+        text = "all faces point inwards: viewers show the far side, or nothing"
     elif found.inside_out_parts:
-        text = f"{found.inside_out_parts} closed parts look inwards"
+        text = f"{found.inside_out_parts} closed parts have faces that point inwards"
     else:
         return
     yield _found(body, "error", "winding", text, do)
@@ -300,8 +316,8 @@ def overlap_findings(bodies: Sequence[Body]) -> Iterator[MaterialFinding]:
             continue  # primitives that bound one body
         work += POINTS * (len(placed[i][0].mesh.faces) + len(placed[j][0].mesh.faces))
         if work > MOST_WORK:
-            text = "many or large bodies are near each other: whether the later ones cross was not looked at"
-            yield _found(placed[i][0], "note", "overlap-unchecked", text, "check them in parts, if it matters")
+            text = "too many bodies or triangles are close to each other, so some pairs were not tested for overlaps"
+            yield _found(placed[i][0], "note", "overlap-unchecked", text, "to test all pairs, split the file")
             return
         yield from _pair(*placed[i], *placed[j])
 
@@ -315,17 +331,17 @@ def _pair(one: Body, at: Placement, other: Body, there: Placement) -> Iterator[M
         text = (
             f"{inner!r} lies inside {outer!r}: three.js and Filament do not show one transmissive body through another"
         )
-        do = "leave it for ray tracers; for viewers give one of them alphaMode BLEND, or none of the transmission"
+        do = "for viewers, give one of the two bodies alphaMode BLEND, or no transmission; ray tracers need no change"
         yield _found(one, "note", "nested", text, do, where)
     elif mine > CROSSING and theirs > CROSSING:
-        text = f"the bodies cross ({mine:.0%} and {theirs:.0%} of their surfaces lie in the other): what fills the "
-        text += "common space, both media or one, renderers decide differently"
-        do = "let them touch without crossing, or tell the renderer which one wins (tl.Object(priority=...))"
+        text = f"the bodies overlap ({mine:.0%} and {theirs:.0%} of their surfaces lie inside the other body): in the "
+        text += "overlap, some renderers use both media, others one of them"
+        do = "separate the bodies, or choose which medium fills the overlap (tl.Object(priority=...))"
         yield _found(one, "warning", "overlap", text, do, where)
 
 
 def _inside(body: Body, at: Placement, other: Body, there: Placement) -> float:
-    """Fraction of a body's surface that lies inside another, of the part that is not on its surface."""
+    """Fraction of a body's surface inside another body; points on the surface of the other body do not count."""
     step = max(1, len(body.points) // POINTS)
     world = body.points[::step] @ at.matrix[:3, :3].T + at.matrix[:3, 3]
     local = np.linalg.solve(there.matrix[:3, :3], (world - there.matrix[:3, 3]).T).T
@@ -340,7 +356,7 @@ def _inside(body: Body, at: Placement, other: Body, there: Placement) -> float:
 def thickness_findings(body: Body) -> Iterator[MaterialFinding]:
     """Findings about the thickness that a body's material states."""
     if body.texture_problem:
-        do = "export it with these texture coordinates, or let --fix bake a texture"
+        do = "export the mesh with these texture coordinates, or let --fix bake a texture"
         yield _found(body, "error", "thickness-texture-unreadable", body.texture_problem, do)
     if body.material.thickness == 0:
         yield from _without_thickness(body)
@@ -351,28 +367,29 @@ def thickness_findings(body: Body) -> Iterator[MaterialFinding]:
 
 
 def attenuation_findings(body: Body) -> Iterator[MaterialFinding]:
-    """Findings about the color that passes a body, and about its size."""
+    """Findings about the color that a body transmits, and about its size."""
     lengths = body.chords * body.world_views()
     thick = float(np.median(lengths[np.isfinite(lengths)])) if np.isfinite(lengths).any() else 0.0
     if thick == 0 or body.material.medium() is None:
         return
     extinction = extinction_of(body)
     passed = Medium(absorption=extinction).transmittance(thick)
-    at = f"at its true thickness of {length_text(thick)} (median along views)"
+    at = f"at the true thickness of {length_text(thick)} (median along view rays)"
     reported = False
     if extinction.any() and passed.max() < BLACK:
         do = "raise attenuationDistance, or brighten attenuationColor"
-        yield _found(body, "warning", "attenuation-black", f"{at} nothing passes: it is black", do)
+        yield _found(body, "warning", "attenuation-black", f"{at}, no light passes: the body is black", do)
         reported = yield from _units(body, thick, extinction, UNITS)
     elif extinction.any() and passed.min() > WHITE:
-        text = f"{at} {to_hex(passed)} passes: attenuation has no effect that can be seen"
+        text = f"{at}, white light becomes {to_hex(passed)}: the attenuation is not visible"
         yield _found(body, "warning", "attenuation-none", text, "lower attenuationDistance")
         reported = yield from _units(body, thick, extinction, [(name, 1.0 / size) for name, size in UNITS[:2]])
     if not reported and not USUAL[0] <= thick <= USUAL[1]:
         scale = 0.01 if thick > USUAL[1] else 100.0
-        text = f"it is {length_text(thick)} thick along views, and what light passes is rarely so"
+        text = f"the body is {length_text(thick)} thick along view rays, an unusual size for a translucent body"
         do = (
-            f"check the unit: glTF is in metres; should it be {length_text(scale * thick)}, scale its node by {scale:g}"
+            f"check the unit: glTF is in metres; for a thickness of {length_text(scale * thick)}, scale the node by "
+            f"{scale:g}"
         )
         yield _found(body, "note", "size-unusual", text, do)
 
@@ -386,10 +403,10 @@ def _without_thickness(body: Body) -> Iterator[MaterialFinding]:
     material = body.material
     if not material.has_volume or not extinction_of(body).any():
         return
-    text = "thicknessFactor is 0 beside an attenuation: viewers draw a thin wall and show none of it"
+    text = "thicknessFactor is 0, but the material has an attenuation: viewers draw a thin wall without it"
     if body.mesh.diagnosis.closed:
         thick = length_text(float(np.nanmedian(np.where(np.isfinite(body.beneath), body.beneath, np.nan))))
-        do = f"write the thickness of the mesh, {thick} along its normals in mesh space (--fix bakes it)"
+        do = f"set it to the thickness of the mesh, {thick} along the normals in mesh space (--fix bakes it)"
         yield _found(body, "error", "thickness-zero", text, do)
     else:
         yield _found(body, "warning", "thickness-zero", text, "remove the attenuation, or close the mesh")
@@ -408,10 +425,10 @@ def _against_truth(body: Body) -> Iterator[MaterialFinding]:
     beneath = body.typical[0]
     if stated > high and beneath < WALL_SHARE * side and side / OF_THE_BODY <= stated <= OF_THE_BODY * side * 1.5:
         text = (
-            f"the mesh is a shell with walls of {beneath:.3g}, and the thickness stated, {stated:.3g}, is that of the "
-            f"whole body (mesh space)"
+            f"the mesh is a shell with walls of {beneath:.3g}, but the stated thickness {stated:.3g} is the "
+            "thickness of the whole body (mesh space)"
         )
-        do = f"state the thickness of the wall, {beneath:.3g} (--fix bakes it), or remove the inner surface"
+        do = f"set thicknessFactor to the wall thickness, {beneath:.3g} (--fix bakes it), or remove the inner surface"
         yield _found(body, "error", "shell-as-solid", text, do)
         return
     severity: Severity = "error" if ratio >= WRONG and extinction_of(body).any() else "warning"
@@ -424,26 +441,26 @@ def _compared(body: Body, stated: float, ratio: float) -> str:
     ends = [np.percentile(values[np.isfinite(values)], 95) for values in (body.beneath, body.chords)]
     per_metre = float(np.median(body.world_normals()))
     text = (
-        f"stated {stated:.3g} (median), true {beneath:.3g} along normals (p95 {ends[0]:.3g}), {chords:.3g} along views "
-        f"(p95 {ends[1]:.3g}), {around:.3g} around normals, in mesh space, where 1 is {length_text(per_metre)}: "
-        f"{ratio:.3g} times off"
+        f"the stated thickness is {stated:.3g} (median), but the true thickness is {beneath:.3g} along normals (p95 "
+        f"{ends[0]:.3g}), {chords:.3g} along view rays (p95 {ends[1]:.3g}) and {around:.3g} around normals, in mesh "
+        f"space, where 1 is {length_text(per_metre)}: wrong by a factor of {ratio:.3g}"
     )
     if not extinction_of(body).any():
-        return f"{text}; nothing attenuates, so that only the bend of what is behind is wrong"
+        return f"{text}; the medium is clear, so only the refraction is wrong"
     shown, true = mean_colors(body)
-    return f"{text}; it shows {to_hex(shown)} where {to_hex(true)} passes"
+    return f"{text}; viewers show {to_hex(shown)} in place of {to_hex(true)}"
 
 
 def _advice(body: Body, code: str, low: float, high: float) -> str:
     span = f"{low:.3g}" if high < 1.05 * low else f"{low:.3g} to {high:.3g}"
-    do = f"write thicknessFactor {span}" + (" (--fix bakes a map)" if body.mesh.diagnosis.closed else "")
+    do = f"set thicknessFactor to {span}" + (" (--fix bakes a map)" if body.mesh.diagnosis.closed else "")
     if code == "thickness-too-small":
-        return f"{do}; if a hollow body is meant, its mesh lacks the inner surface, and ray tracers fill it"
+        return f"{do}; for a hollow body, add its inner surface: ray tracers treat this body as solid"
     return do
 
 
 def mean_colors(body: Body) -> tuple[Array, Array]:
-    """Mean colors that pass over all views: with the stated length along each ray, and with the true one."""
+    """Mean transmitted colors over all views: for the stated thickness, and for the true thickness."""
     medium, world = Medium(absorption=extinction_of(body)), body.world_views()
     finite = np.isfinite(body.chords)
     if not finite.any():
@@ -464,19 +481,25 @@ def _map_findings(body: Body) -> Iterator[MaterialFinding]:
         return
     empty = float(np.mean(stated < NO_VALUE * true))
     if empty > MUCH:
-        text = f"the thickness texture is black on {empty:.0%} of the surface, where viewers show no attenuation"
-        yield _found(body, "warning", "thickness-map-empty", text, "bake it again (--fix)")
+        text = f"the thickness texture is black on {empty:.0%} of the surface; viewers show no attenuation there"
+        yield _found(body, "warning", "thickness-map-empty", text, "bake the texture again (--fix)")
     low, high = np.percentile(true, [10, 90])
     if high > SPREAD * low and np.ptp(stated) > 0:
         correlation = float(np.corrcoef(rankdata(stated), rankdata(true))[0, 1])
         if correlation < INVERTED:
             text = f"the thickness texture is dark where the mesh is thick (rank correlation {correlation:.2f})"
-            yield _found(body, "error", "thickness-map-inverted", text, "invert it: white is thick (--fix bakes it)")
+            yield _found(
+                body,
+                "error",
+                "thickness-map-inverted",
+                text,
+                "invert it: white is thick (--fix bakes it)",
+            )
             return
     below, above = np.minimum(body.beneath[finite], true), np.maximum(body.beneath[finite], true)
     off = float(np.mean((stated > WRONG * above) | (WRONG * stated < below)))
     if off > MUCH_OFF and off > empty:
-        text = f"the thickness texture is more than {WRONG:g} times off on {off:.0%} of the surface"
+        text = f"on {off:.0%} of the surface, the thickness texture is wrong by a factor of more than {WRONG:g}"
         yield _found(body, "warning", "thickness-map-off", text, "bake it again (--fix): it may be of another mesh")
 
 
@@ -488,12 +511,12 @@ def _units(
         passed = Medium(absorption=extinction).transmittance(scale * thick)
         if passed.max() > PLAUSIBLE[0] and passed.min() < PLAUSIBLE[1]:
             small = scale < 1
-            meant = "its lengths were in" if small else "its attenuation was meant for"
+            meant = "the lengths were in" if small else "the attenuation was meant for"
             text = (
-                f"{length_text(thick)} thick it is {'black' if small else 'clear'}; {length_text(scale * thick)} thick "
-                f"it would be {to_hex(passed)}, as if {meant} {name}"
+                f"at a thickness of {length_text(thick)}, the body is {'black' if small else 'clear'}; at "
+                f"{length_text(scale * thick)}, it would be {to_hex(passed)}, as if {meant} {name}"
             )
-            do = f"glTF is in metres: scale its node by {scale:g}, or attenuationDistance by {1 / scale:g}"
+            do = f"glTF is in metres: scale the node by {scale:g}, or attenuationDistance by {1 / scale:g}"
             yield _found(body, "warning", "units-suspect", text, do)
             return True
     return False
@@ -504,7 +527,7 @@ def _found(body: Body, severity: Severity, code: str, text: str, do: str, where:
 
 
 def viewer_colors(body: Body) -> dict[str, Array]:
-    """Mean linear color (3,) that passes a body, by viewer, and ``"true"``."""
+    """Mean linear color (3,) that a body transmits in each viewer, and the true one."""
     finite = np.isfinite(body.chords)
     if not finite.any():
         return {}

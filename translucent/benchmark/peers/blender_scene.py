@@ -136,7 +136,7 @@ def add_light(scene, told):
 
 
 def use_cycles(scene, samples):
-    """Paths without limits, clamps or filters that bend the truth, denoised."""
+    """Configure Cycles: no limits, clamps or filters that bias the picture, with denoising."""
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
     cycles.device, cycles.samples, cycles.use_adaptive_sampling = "CPU", samples, False
@@ -149,7 +149,7 @@ def use_cycles(scene, samples):
 
 
 def use_eevee(scene, samples):
-    """Ray tracing in screen space, shadows and volumes at their finest."""
+    """Configure EEVEE: screen-space ray tracing, finest shadows and volumes."""
     scene.render.engine = "BLENDER_EEVEE"
     eevee = scene.eevee
     eevee.taa_render_samples, eevee.use_raytracing, eevee.use_shadows = samples, True, True
@@ -158,7 +158,7 @@ def use_eevee(scene, samples):
 
 
 def main(engine, samples):
-    """Render what standard input names."""
+    """Render the scenes named on standard input."""
     print("@" + json.dumps({"version": bpy.app.version_string}), flush=True)
     for line in sys.stdin:
         order = json.loads(line)

@@ -62,7 +62,7 @@ class PhotonTracer:
 
 
 class CausticsPass:
-    """Photons that interfaces turn onto opaque objects; see ``shaders/transport/photon_step.glsl``."""
+    """Pass that traces photons through interfaces onto opaque objects; see ``shaders/transport/photon_step.glsl``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
@@ -95,7 +95,7 @@ class CausticsPass:
         return self.shade(job, job.targets.view("opaque", 1))
 
     def begin(self, stack: ExitStack, job: FrameJob) -> PhotonTracer:
-        """Get ready to follow photons in the scene of a job, and clear what has landed."""
+        """Prepare photon tracing in the scene of a job, and clear landed photons."""
         require_interfaces(job.gl.info)
         assert job.plan.caustics is not None
         job.targets["photons"].clear()
@@ -170,13 +170,13 @@ class CausticsPass:
         self._splat.draw_points(program, count)
 
     def draw_depth(self, job: FrameJob, objects: tuple[int, ...]) -> None:
-        """Draw where opaque objects are, and nothing else of them."""
+        """Draw the depth of opaque objects."""
         ends = job.targets.opaque_ends()
         ends.clear(float(CONSTANTS["NOTHING"]), depth=1.0)
         self._opaque.draw_depth(job, objects, ends)
 
     def draw_base(self, job: FrameJob, objects: tuple[int, ...]) -> None:
-        """Draw what opaque objects reflect diffusely, as `OpaquePass` draws their radiance."""
+        """Draw the diffuse reflectance of opaque objects."""
         framebuffer = job.targets["base"]
         framebuffer.use()
         framebuffer.clear(depth=1.0)

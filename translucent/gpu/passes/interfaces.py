@@ -87,7 +87,7 @@ _PLAIN_SAMPLERS = (
 
 
 class NoInterface:
-    """Draw what is behind, through the media on a straight ray; see ``shaders/shade/no_interface.frag``."""
+    """Draw the background through media along straight rays; see ``shaders/shade/no_interface.frag``."""
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._variants = Variants(gl, "geometry/fullscreen.vert", "shade/no_interface.frag", *_PLAIN_SAMPLERS)
@@ -179,7 +179,7 @@ class SurfacesPass:
         table.release()
 
     def _bind(self, job: FrameJob, table: moderngl.Texture) -> None:
-        """Bind what passes before have found: paths, interfaces and opaque surfaces; and objects and lights."""
+        """Bind the results of earlier passes (paths, interfaces, opaque surfaces), and objects and lights."""
         found = job.targets["result"].color_attachments[:4] + job.targets["entered"].color_attachments
         if not job.features.one_interface:
             found += job.targets["left"].color_attachments

@@ -100,7 +100,7 @@ class OpaquePass:
     def draw_depth(
         self, view: CameraView, objects: tuple[int, ...], framebuffer: moderngl.Framebuffer, *, projected: bool = False
     ) -> None:
-        """Draw no more than where opaque objects are, into a cleared framebuffer (R32F) with a depth buffer.
+        """Draw the depth of opaque objects into a cleared framebuffer (R32F) with a depth buffer.
 
         That is linear, or, where passes that follow test against it, has the depth of the projection.
         """
@@ -126,7 +126,7 @@ def shadow_switches(used: bool, resources: Resources) -> dict[str, bool]:
 
 
 def interface_shadow_switches(job: FrameJob) -> dict[str, bool]:
-    """The same for shaders of interfaces and of random paths, which read many textures besides."""
+    """Shadow switches for shaders of interfaces and random paths, which read many other textures."""
     enough = job.resources.texture_units >= UNITS_WITH_SHADOWS
     return shadow_switches(job.features.has_shadow_maps and enough, job.resources)
 

@@ -238,7 +238,7 @@ class PathTracer:
             textures = [self._gl.texture(size, 4, dtype="u4" if name in _UNSIGNED else "f4") for name in _STATE]
             framebuffer = self._gl.framebuffer(textures)
         except moderngl.Error as error:
-            found = f"OpenGL has no room for the state of paths ({error})"
+            found = f"OpenGL does not have enough memory for the paths ({error})"
             raise RenderError(f"path tracing {width}x{height}", found, "choose a smaller picture") from error
         for resource in (framebuffer, *textures):
             stack.callback(resource.release)

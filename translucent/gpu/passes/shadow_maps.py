@@ -1,4 +1,4 @@
-"""Maps of shadows: signed depth from each light, and from directions of the environment, down to what is opaque.
+"""Shadow maps: signed depth from each light and from directions of the environment, up to opaque surfaces.
 
 A ground has a map of the environment's shadows: a point looks up each direction once, and not for each sample.
 """
@@ -149,7 +149,7 @@ class ShadowMapsPass:
         self._ground = GroundShadowsPass(gl)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Render those of the maps that the frame reads and that are not there, and write the uniforms.
+        """Render the missing shadow maps of the frame, and write the uniforms.
 
         For a window they may take several frames; what is there stays until objects or lights change.
         """
@@ -265,7 +265,7 @@ class ShadowMapsPass:
         return key, self._plans[key]
 
     def _add_up(self, light: MapJob) -> None:
-        """Draw one map where it is."""
+        """Draw one shadow map into its place in the atlas."""
         with contextlib.ExitStack() as stack:
             stack.callback(light.release)
             for step in light.plan.passes:
@@ -352,7 +352,7 @@ def _sky_lights(scene: Scene) -> list[Light]:
 
 
 def _map_key(job: FrameJob) -> ShadowMapKey:
-    """Maps of what lights see in a frame; keeps nothing alive."""
+    """Cache key of shadow maps; keeps nothing alive."""
     scene = job.scene
     inside = tuple(item.medium is None and holds_eye(item, scene) for item in scene.objects)
     media = tuple(

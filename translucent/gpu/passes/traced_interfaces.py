@@ -160,7 +160,7 @@ class TracedInterfacesPass:
             variants.draw_part(band, program, framebuffer)
 
     def _mark_unsettled(self, job: FrameJob) -> None:
-        """Leave depths that let pass pixels that need more samples: of interfaces, and of what a ground mirrors."""
+        """Write depths that let only pixels pass which need more samples."""
         marked = [("unsettled", "bent", job.covered.flipped(job.targets.size[1]))]
         if job.mirror is not None:
             marked.insert(0, ("mirror_unsettled", "mirrored", mirrored_part(job, job.mirror)))
@@ -289,7 +289,7 @@ def blurred_fraction(samples: int) -> float:
 
 
 def traced_scene(job: FrameJob, stack: ExitStack) -> tuple[dict[str, moderngl.Texture], dict[str, Any]]:
-    """Textures by which rays find what they hit in the scene of a job, and loose uniforms; released with the stack."""
+    """Textures of the scene for ray tracing, and loose uniforms; released with the stack."""
     scene, center = job.scene, media_center(job.scene)
     hierarchies = job.resources.hierarchies.of(scene, textured=job.features.textured)
     placements, frame = hierarchies.place(scene, center)

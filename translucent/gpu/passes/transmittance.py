@@ -114,7 +114,7 @@ class TransmittancePass:
             set_used(program, values)
 
     def _bind_paths(self, job: FrameJob) -> dict[str, bool | int]:
-        """Bind what passes before have found, and the switches that say what that is."""
+        """Bind the results of earlier passes, and the matching switches."""
         plan, features, apart = job.plan, job.features, job.media_apart
         inputs = {
             "accumulated": job.accumulator() if features.accumulates and apart is None else None,

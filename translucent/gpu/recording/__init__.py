@@ -92,7 +92,7 @@ class FrameRecorder:
 
     @property
     def resources(self) -> Resources:
-        """Caches of what has been made."""
+        """Caches of uploaded textures and meshes."""
         return self._resources
 
     def record(self, plan: RenderPlan) -> RecordedFrame:

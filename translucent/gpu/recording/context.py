@@ -1,4 +1,4 @@
-"""Stand-in for an OpenGL context that records each draw with all its state, to be replayed in a browser."""
+"""Replacement of an OpenGL context that records all draws with their state, for replay in a browser."""
 
 from __future__ import annotations
 
@@ -422,17 +422,17 @@ class RecordedFramebuffer(_Recorded):
 
     @property
     def part(self) -> tuple[int, int, int, int] | None:
-        """Viewport, unless it is all."""
+        """Viewport, or None for the whole target."""
         return None if tuple(self.viewport) == self._whole else tuple(self.viewport)
 
     def clear(
         self, red: float = 0.0, green: float = 0.0, blue: float = 0.0, alpha: float = 0.0, depth: float = 1.0
     ) -> None:
-        """Note that it is cleared."""
+        """Record a clear."""
         self._gl.note_clear(self, (red, green, blue, alpha), depth)
 
     def read(self, viewport: Any = None, components: int = 4, **_: Any) -> bytes:
-        """Stand in for the result that passes look at: as many crossings as the recording is to allow."""
+        """Result of a query during recording: as many crossings as the recording should allow."""
         width, height = (viewport or self._whole)[2:]
         return np.full(width * height * components, self._gl.most_layers, np.float32).tobytes()
 
@@ -453,7 +453,7 @@ class RecordedArray(_Recorded):
     looks: str
 
     def render(self, mode: int | None = None, vertices: int = -1) -> None:
-        """Note a draw, unless it is a query's."""
+        """Record a draw, unless it belongs to a query."""
         if not self.gl.asking:
             self.gl.note_draw(self)
 

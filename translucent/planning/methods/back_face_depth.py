@@ -26,7 +26,7 @@ class BackFaceDepth(Method):
         if sheets := [scene.objects[i] for i in sheets_of(scene)]:
             raise InputError(
                 "BackFaceDepth",
-                f"{object_names(sheets)} declared as a thin-walled sheet",
+                f"{object_names(sheets)}: this method cannot render thin-walled sheets",
                 "use SignedDepth or ThinLayer",
             )
 
@@ -39,9 +39,9 @@ class BackFaceDepth(Method):
         """Notes on pixels whose ray enters a body more than once, or more than one body."""
         limits = []
         if len(scene.bodies) > 1:
-            text = "several bodies: pixels that cross more than one are marked invalid"
+            text = "pixels whose rays cross more than one body are marked as invalid"
             limits.append(Note(NoteKind.SEVERAL_BODIES, text))
         if concave := [body for body in scene.bodies if not body.mesh.diagnosis.convex]:
-            text = f"{object_names(concave)} not convex: pixels with more than one entry are marked invalid"
+            text = f"{object_names(concave)}: not convex, so pixels with more than one entry are marked as invalid"
             limits.append(Note(NoteKind.NOT_CONVEX, text))
         return limits

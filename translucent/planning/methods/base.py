@@ -166,10 +166,10 @@ def chosen_hits(what: str, requested: str | None, software: bool, shader_storage
     """
     if requested == "gl" or (requested is None and not (software and shader_storage)):
         return "gl", ""
-    refusal = embree_refusal() if shader_storage else "this OpenGL has no compute shaders, which came with 4.3"
+    refusal = embree_refusal() if shader_storage else "this OpenGL has no compute shaders, which need version 4.3"
     if not refusal:
         return "embree", ""
     if requested is not None:
-        do = "pip install -U embreex, or leave hits out" if shader_storage else "leave hits out"
+        do = "pip install -U embreex, or omit hits" if shader_storage else "leave hits out"
         raise InputError(f'{what}(hits="embree")', refusal, do)
-    return "gl", f"{refusal}: OpenGL finds the surfaces that rays hit, in about twice the time; pip install -U embreex"
+    return "gl", f"{refusal}, so OpenGL finds the hits, in about twice the time; pip install -U embreex"

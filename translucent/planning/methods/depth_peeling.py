@@ -63,7 +63,7 @@ class DepthPeeling(Method):
         expected = sum(2 if body.mesh.diagnosis.convex else _GUESSED_LAYERS for body in bodies)
         layers = min(expected, self.max_layers)
         both_ends = self.order == "both-ends"
-        reason = f"{why}; {'two layers' if both_ends else 'a layer'} with each draw, until all are found"
+        reason = f"{why}; each draw finds {'two layers' if both_ends else 'one layer'}, until none is left"
         # Where some layers are left out, one more draw counts the faces of the last that is not.
         draws = (-(-layers // 2) if both_ends else layers) + (expected > layers)
         return (PassSpec(PassName.DEPTH_PEELING, reason, solids, draws, cost=draws * self.cost),)

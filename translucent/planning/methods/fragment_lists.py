@@ -37,5 +37,5 @@ class FragmentLists(Method):
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
         """Passes: one draw of all solids."""
-        reason = f"{why}; one draw into a list for each pixel, sorted afterwards"
+        reason = f"{why}; one draw fills a list for each pixel, which is then sorted"
         return (PassSpec(PassName.FRAGMENT_LISTS, reason, solids_of(scene), 1, cost=self.cost),)

@@ -73,7 +73,7 @@ class PathTraced(Method):
     def check(self, scene: Scene) -> None:
         """Refuse open bodies, layers, densities that vary, and sheets that scatter or are rough."""
         if scene.scatters_ambient:
-            found = "it represents light that paths find anyway: light of the environment, and light scattered often"
+            found = "ambient radiance stands for light that random paths find themselves"
             raise InputError("PathTraced with ambient radiance", found, "omit the ambient radiance")
         for bodies, found, do in _refusals(scene):
             if bodies:
@@ -87,7 +87,7 @@ class PathTraced(Method):
 
     def limits(self, scene: Scene) -> list[Note]:
         """Note that radiance has noise."""
-        text = f"radiance is a mean over {self.paths} random paths: its noise is in standard_error"
+        text = f"radiance is the mean of {self.paths} random paths; frame.standard_error states its noise"
         return [Note(NoteKind.NOISE, text)]
 
     def unmodelled(self, scene: Scene) -> tuple[Note, ...]:
@@ -97,24 +97,19 @@ class PathTraced(Method):
         # `plan` has points in place of spheres, each a part of one.
         if any(not isinstance(light, PositionalLight) or light.disc[3] == 0.0 for light in scene.lights) and bending:
             text = (
-                "light of point, spot and directional lights that polished interfaces refract, in media and as "
-                "caustics: "
-                "no random path hits a light without a size; use a tl.SphereLight"
+                "caustics and refracted light of point, spot and directional lights are missing, because no random "
+                "path hits a light without a size; use tl.SphereLight"
             )
             notes.append(Note(NoteKind.LIGHTS_LEFT_OUT, text))
         surfaces = [(body, body.surface) for body in scene.bodies if body.surface is not None]
         if dispersive := [body for body, surface in surfaces if surface.dispersion > 0.0]:
-            text = f"dispersion: {object_names(dispersive)} refract all colors alike"
+            text = f"{object_names(dispersive)}: no dispersion; all colors are refracted alike"
             notes.append(Note(NoteKind.REFRACTION, text))
         if rough := [body for body, one in surfaces if one.clearcoat > 0.0 and one.clearcoat_roughness > 0.0]:
-            text = f"roughness of clear coats: {object_names(rough)} have polished ones"
+            text = f"{object_names(rough)}: rough clear coats are rendered as polished"
             notes.append(Note(NoteKind.COATS, text))
         if emitting := [body for body, surface in surfaces if surface.glows]:
-            notes.append(
-                Note(
-                    NoteKind.GLOW, f"light that surfaces emit: missing in the whole picture ({object_names(emitting)})"
-                )
-            )
+            notes.append(Note(NoteKind.GLOW, f"{object_names(emitting)}: light that these surfaces emit is missing"))
         return tuple(notes)
 
 
@@ -139,12 +134,12 @@ def _bends(body: Object) -> bool:
 
 
 def _refusals(scene: Scene) -> tuple[tuple[list[Object], str, str], ...]:
-    """Bodies that paths cannot follow, by what they are, and what to do."""
+    """Bodies that cannot be path traced, with reason and advice."""
     sheets = [body for body in scene.bodies if body.sheet_thickness is not None]
     return (
         (
             [scene.objects[i] for i in open_bodies(scene)],
-            "not closed, so that a path cannot tell which medium it is in",
+            "not closed, so a path cannot tell which medium it is in",
             "close it, or declare it a sheet (sheet_thickness=...)",
         ),
         (
@@ -154,17 +149,17 @@ def _refusals(scene: Scene) -> tuple[tuple[list[Object], str, str], ...]:
         ),
         (
             [body for body in scene.bodies if body.covers],
-            "partly transparent layers, which are drawn over a picture",
+            "partly transparent layers are drawn over the picture, not traced",
             "leave them out, or use another method",
         ),
         (
             [body for body in sheets if body.medium is not None and body.medium.scatters],
-            "a sheet that scatters",
-            "give it an inside, or use another method",
+            "path tracing does not support sheets that scatter",
+            "use a closed body instead, or use another method",
         ),
         (
             [body for body in sheets if body.surface is not None and body.surface.roughness > 0.0],
-            "a sheet that is rough",
+            "path tracing does not support rough sheets",
             "use tl.reference.path_trace(scene, size)",
         ),
     )

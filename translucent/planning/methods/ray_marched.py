@@ -109,21 +109,17 @@ class RayMarched(Method):
 
     def passes(self, scene: Scene, why: str) -> tuple[PassSpec, ...]:
         """Passes: one draw of all solids, and the steps."""
-        reason = f"{why}; one draw into a list for each pixel, then {self.steps} steps through each interval"
+        reason = f"{why}; one draw fills a list for each pixel, then {self.steps} steps through each interval"
         cost = self.cost + self.step_cost * self.steps
         return (PassSpec(PassName.FRAGMENT_LISTS, reason, solids_of(scene), 1, cost=cost),)
 
     def limits(self, scene: Scene) -> list[Note]:
         """Notes on the error of a sum over steps."""
-        what = (
-            "optical depth, and what is emitted and scattered, are"
-            if scene.varies
-            else "what is emitted and scattered is"
-        )
+        what = "optical depth, emission and scattered light are" if scene.varies else "emission and scattered light are"
         text = (
-            f"{what} a sum over {self.steps} steps in each interval ({self.quadrature}); what lies behind a "
-            f"transmittance of {LEAST_SEEN:g} is left out of it"
+            f"{what} summed over {self.steps} steps in each interval ({self.quadrature}), down to a transmittance "
+            f"of {LEAST_SEEN:g}"
         )
         if scene.varies and scene.lights:
-            text += "; depths from the lights are exact, with a path through the density for each step and light"
+            text += "; optical depths towards lights are exact, and computed for each step and light"
         return [Note(NoteKind.STEPS, text)]

@@ -48,17 +48,17 @@ class SignedDepth(Method):
             return ()
         spectral = media_differ(scene)
         what = (
-            "optical depth per channel, since media differ"
+            "optical depth per channel, because media differ"
             if spectral
-            else "thickness, since all bodies share one medium"
+            else "thickness, because all bodies share one medium"
         )
         draws = f"{count_of(solids, 'body', 'bodies')} in one unsorted draw each"
-        reason = f"{draws}: distances where rays leave, minus those where they enter, add up to {what}"
+        reason = f"{draws}: distances of exits minus distances of entries add up to {what}"
         return (PassSpec(PassName.SIGNED_DEPTH, reason, solids, 1, cost=self.cost_for(spectral=spectral)),)
 
     def limits(self, scene: Scene) -> list[Note]:
         """Notes on digits lost in distances from the camera."""
         if self.anchored:
             return []
-        text = "distances count from the camera: float32 loses digits with distance"
+        text = "distances are measured from the camera, so float32 loses digits far away"
         return [Note(NoteKind.DISTANCE_FROM_CAMERA, text)]

@@ -54,7 +54,9 @@ class ThinLayer(Method):
         """Passes: one draw of all bodies."""
         bodies = indices(scene, lambda body: body.medium is not None)
         return (
-            sheet_pass(bodies, f"every face of {count_of(bodies, 'mesh', 'meshes')} is a sheet: their paths add up"),
+            sheet_pass(
+                bodies, f"every face of {count_of(bodies, 'mesh', 'meshes')} is a sheet: their path lengths are summed"
+            ),
         )
 
     def limits(self, scene: Scene) -> list[Note]:
@@ -62,7 +64,7 @@ class ThinLayer(Method):
         solid = [body for body in scene.bodies if body.sheet_thickness is None and body.mesh.diagnosis.solid]
         if not solid:
             return []
-        text = f"{object_names(solid)} closed, but drawn as sheets: the inside is left out"
+        text = f"{object_names(solid)}: closed, but drawn as sheets, without the inside"
         return [Note(NoteKind.CLOSED_AS_SHEETS, text)]
 
 

@@ -49,16 +49,20 @@ CURVES = ((0.95, 0.36, 0.33, 1.0), (0.38, 0.80, 0.42, 1.0), (0.36, 0.58, 1.0, 1.
 BARS = (0.55, 0.58, 0.65, 0.35)
 
 SCATTER_TIP = (
-    "Diffuse color of the medium where it is thick (--scattering-color of translucent render): what is absorbed "
-    "follows from it. Typical: wax #f2e0b8, milk #fdfbf5."
+    "Diffuse color of a thick body of this medium (--scattering-color of translucent render). Typical: wax "
+    "#f2e0b8, milk #fdfbf5."
 )
 
 RADIUS_TIP = (
-    "Mean free path: length after which light in the medium is scattered or absorbed, on average (--mean-free-path). "
-    "Larger ones let more light through, smaller ones look like plaster. Typical: skin 0.3 mm, wax 2 mm, jade 4 mm."
+    "Mean free path: length after which light in the medium is scattered or absorbed, on average "
+    "(--mean-free-path). Large values let more light through, small values look like plaster. Typical: skin 0.3 "
+    "mm, wax 2 mm, jade 4 mm."
 )
 
-SAVE_TIP = "Saves the medium, ior and roughness as a .toml file to be shared: others put it into this folder of theirs."
+SAVE_TIP = (
+    "Save the medium, ior and roughness as a .toml file. To share this preset, others copy the file into "
+    "the same folder."
+)
 
 
 def material_panel(state: WindowState) -> None:
@@ -166,7 +170,7 @@ def _source(state: WindowState, material: Material) -> None:
     if ui.begin_rows("source"):
         if len(state.objects) > 1:
             _object(state)
-        ui.row("preset", "A named medium; the Library has them as pictures.")
+        ui.row("preset", "A named medium; the Library shows pictures of all media.")
         if imgui.begin_combo("##preset", material.preset or "none"):
             for group, members in grouped(presets()).items():
                 imgui.text_colored(ui.FAINT, group)
@@ -193,7 +197,10 @@ def _object(state: WindowState) -> None:
             return "all without their own"
         return state.name_of(number) + (" *" if document.own_material(number) is not None else "")
 
-    ui.row("object", "Click one in the picture, or choose it here. Changes are then of its own material.")
+    ui.row(
+        "object",
+        "Click an object in the picture, or choose it here. Changes then apply only to the material of this object.",
+    )
     numbers: list[int | None] = [None, *range(len(state.objects))]
     ui.combo(
         "object", name(target), ((f"{name(number)}##{number}", number) for number in numbers), target, state.select
@@ -212,7 +219,7 @@ def _color(state: WindowState, material: Material) -> None:
     if changed:
         state.change("material.color", from_display(np.asarray(list(encoded)[:3])))
     ui.fact("linear", triple_text(material.color))
-    ui.row("as text", "A hex color, a CSS name, srgb(r,g,b) or linear(r,g,b); press Enter.")
+    ui.row("as text", "Write a hex color, a CSS name, srgb(r,g,b) or linear(r,g,b), and press Enter.")
     if text := ui.text_field(state, "colortext", to_hex(material.color)):
         try:
             color = np.asarray(parse_color(text)).tolist()
@@ -272,7 +279,7 @@ def _curves(state: WindowState, material: Material) -> None:
         spec = implot.Spec()
         spec.fill_color = spec.line_color = imgui.ImVec4(*BARS)
         width = float(centers[1] - centers[0])
-        implot.plot_bars("how much of the model is so thick", centers, statistics.counts, width, spec)
+        implot.plot_bars("fraction of pixels with this thickness", centers, statistics.counts, width, spec)
     for channel, name in enumerate(("red", "green", "blue")):
         spec = implot.Spec()
         spec.line_color, spec.line_weight = imgui.ImVec4(*CURVES[channel]), 2.0
@@ -315,11 +322,11 @@ def library_panel(state: WindowState) -> None:
     imgui.set_next_item_width(-1.0)
     hint = "search: wine, measured, stone ..."
     _, library.search = imgui.input_text_with_hint("##search", hint, library.search)
-    target = "fills the model" if state.target is None else f"assigns to {state.name_of(state.target)}"
-    ui.wrapped(f"Click: {target}. Drag: onto an object.", ui.FAINT)
+    target = "fill the model" if state.target is None else f"fill {state.name_of(state.target)}"
+    ui.wrapped(f"Click a preset: {target}. Or drag a preset onto an object.", ui.FAINT)
     groups, chosen = library.groups(), state.material.preset
     if not groups:
-        ui.wrapped("None has these words.", ui.FAINT)
+        ui.wrapped("No preset has these words.", ui.FAINT)
 
     def card(one: Preset) -> ui.Card:
         key, title = ball_key(one), one.name.replace("_", " ")
@@ -405,7 +412,7 @@ def scene_panel(state: WindowState) -> None:
     """Draw the panel that lists the objects of the model, to show, hide and select them."""
     count = len(state.objects)
     visible = len(state.work.document.shown_among(count))
-    ui.wrapped(f"{visible} of {count} objects are on show. Drop a preset of the Library on one.", ui.FAINT)
+    ui.wrapped(f"{visible} of {count} objects are visible. Drop a preset of the Library on an object.", ui.FAINT)
     imgui.begin_disabled(visible == count)
     if imgui.button("Show all"):
         state.work.do(Hide(()))
@@ -415,7 +422,7 @@ def scene_panel(state: WindowState) -> None:
     if imgui.button("Isolate") and state.target is not None:
         state.isolate(state.target)
     imgui.end_disabled()
-    ui.tooltip("The selected object alone; once more: all (I).")
+    ui.tooltip("Show only the selected object; press again to show all (I).")
     _place(state)
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y
     if not imgui.begin_table("objects", 3, flags):
@@ -451,7 +458,7 @@ def _place(state: WindowState) -> None:
         imgui.end_table()
     if imgui.button("On the ground"):
         state.drop_to_ground()
-    ui.tooltip("Moves it until it stands where the model stood.")
+    ui.tooltip("Move the object down to the ground.")
     imgui.same_line()
     imgui.begin_disabled(place == Placed(number))
     if imgui.button("Back in its place"):
@@ -476,7 +483,7 @@ def _row(state: WindowState, number: int) -> None:
         state.select(number)
         if imgui.is_mouse_double_clicked(0):
             state.work.frame(number)
-    ui.tooltip("Click: select, for the Material and Library panels. Double click: frame. Right click: more.")
+    ui.tooltip("Click: select the object. Double click: center the view on it. Right click: more.")
     if ui.accepts_preset():
         state.choose_preset(state.dragged, number if len(state.objects) > 1 else None)
     own = state.work.document.own_material(number) is not None

@@ -28,7 +28,7 @@ KEYS = (
     ("drag", "orbit"),
     ("right drag, Shift drag", "pan"),
     ("wheel", "zoom to the cursor"),
-    ("click", "select an object, whose material the panels then change"),
+    ("click", "select an object; the panels then change its material"),
     ("F", "frame the model, or the selected object"),
     ("H, Alt H", "hide the selected object; show all"),
     ("I", "isolate the selected object; all again"),
@@ -218,8 +218,8 @@ def handle_keys(state: WindowState) -> None:
 
 
 RECIPES = (
-    ("Copy command", "command", "translucent render with options for this picture, its stage and caustics"),
-    ("Copy Python", "python", "A script that makes this picture, with all that no option says"),
+    ("Copy command", "command", "a translucent render command for this picture, its stage and caustics"),
+    ("Copy Python", "python", "a script for this picture, with the settings that have no option"),
 )
 
 #: Width of the browser's column of folders, in ems.
@@ -260,7 +260,7 @@ def files_panel(state: WindowState) -> None:
     imgui.separator_text("Model")
     if imgui.button("Save medium into .glb ..."):
         state.ask_file("save glb")
-    ui.wrapped("A copy of the model's file with this medium in its materials.", ui.FAINT)
+    ui.wrapped("Saves a copy of the model file with this medium in its materials.", ui.FAINT)
     _bake(state)
 
 
@@ -354,7 +354,7 @@ def _files(state: WindowState, browser: Browser) -> bool:
     """Draw the list; returns whether a file was double-clicked."""
     entries, chosen = browser.entries(), False
     if not entries:
-        imgui.text_colored(ui.FAINT, "nothing of these kinds is here")
+        imgui.text_colored(ui.FAINT, "no file of these types in this folder")
     clipper = imgui.ListClipper()
     clipper.begin(len(entries))
     while clipper.step():

@@ -39,7 +39,7 @@ from translucent.units import parse_length, short_length
 CARD = 8.0
 
 #: Advice about invalid pixels of a model with holes.
-CLOSE_HOLES = "Close the holes, or declare the model a sheet (thin-layer). translucent explain tells which edges."
+CLOSE_HOLES = "Close the holes, or choose the method thin-layer. translucent explain lists the open edges."
 
 #: Colors of messages.
 COLORS = {"info": ui.FAINT, "warning": ui.WARNING, "error": ui.ERROR}
@@ -111,7 +111,7 @@ def _animation(state: WindowState) -> None:
     if imgui.button("As written"):
         state.playing = False
         state.work.do(SetTime(None))
-    ui.tooltip("Nodes, skins and morph targets as the file has them, as translucent render without --time.")
+    ui.tooltip("Use the pose that is stored in the file, like translucent render without --time.")
     imgui.set_next_item_width(-1.0)
     now = state.get("model.time")
     form = "as written" if now is None else f"%.3f of {duration:.3g} s"
@@ -154,7 +154,9 @@ def _lights(state: WindowState) -> None:
 
 def _height(state: WindowState) -> None:
     """Field for the height of the model, with a unit."""
-    ui.row("height", "Height of the model, with its unit: 12cm. Press Enter. Media keep their own lengths.")
+    ui.row(
+        "height", "Height of the model with its unit, such as 12cm; then press Enter. Lengths of media do not change."
+    )
     loaded = state.work.loaded
     if loaded is None:
         return ui.wrapped("no model yet", ui.FAINT)
@@ -255,12 +257,12 @@ def _snapshots(state: WindowState) -> None:
     document = state.work.document
     if imgui.button("Keep"):
         state.work.do(Keep(next(name for name in SNAPSHOTS if document.snapshot(name) is None)))
-    ui.tooltip("Materials, lights, places and look, to go back to. Shift 1 to 9 keeps one; 1 to 9 shows it.")
+    ui.tooltip("Stored materials, lights, positions and look. Shift 1 to 9 stores a snapshot; 1 to 9 shows it.")
     for one in document.snapshots:
         imgui.same_line()
         if imgui.button(f"{one.name}##snapshot"):
             state.work.do(Recall(one.name))
-        ui.tooltip("Show it. Right click: compare with it.")
+        ui.tooltip("Show this snapshot. Right click: compare with this snapshot.")
         if imgui.is_item_clicked(1):
             state.compare_with(one.name)
 
@@ -276,7 +278,7 @@ def _plan(plan: RenderPlan, timing: StepTiming) -> None:
             spent = passes.get(step.name)
             ui.fact(step.name, f"{step.reason}" + (f" ({1e3 * spent:.1f} ms)" if spent is not None else ""))
         imgui.end_table()
-    for kind, texts in (("limit", plan.limits), ("not modelled", plan.unmodelled), ("remark", plan.remarks)):
+    for kind, texts in (("limit", plan.limits), ("approximation", plan.unmodelled), ("remark", plan.remarks)):
         for text in texts:
             ui.wrapped(f"{kind}: {text}", ui.WARNING)
 
@@ -285,10 +287,10 @@ def _errors(state: WindowState) -> None:
     measured, unit = state.work.measured, state.get("display.unit")
     scene, display = state.work.scene(), state.work.document.display
     if scene is not None and not (display.inset or measurable(scene)):
-        many = f"{MOST_TRIANGLES:,} triangles and more take much memory"
-        ui.wrapped(f"not measured, unless its inset is shown: {many}", ui.FAINT)
+        many = f"models of {MOST_TRIANGLES:,} triangles and more need much memory"
+        ui.wrapped(f"measured only while the inset is open: {many}", ui.FAINT)
     elif measured is None or measured.scene is not scene:
-        ui.wrapped("measured as soon as the view is still", ui.FAINT)
+        ui.wrapped("measured when the view stops moving", ui.FAINT)
     if measured is None:
         return
     if measured.doubt:
@@ -307,7 +309,7 @@ def _validity(state: WindowState) -> None:
     measured, loaded = state.work.measured, state.work.loaded
     if measured is not None:
         invalid = measured.seen.invalid
-        text = f"{invalid} of {measured.truth.shape[0] * measured.truth.shape[1]} measured pixels are not valid"
+        text = f"{invalid} of {measured.truth.shape[0] * measured.truth.shape[1]} measured pixels are invalid"
         ui.wrapped(text, ui.ERROR if invalid else ui.FAINT)
     if loaded is None:
         return

@@ -182,13 +182,13 @@ def _split(state: WindowState, over: imgui.ImDrawList, corner: ImVec2, room: ImV
         over.add_circle_filled(ImVec2(x, corner.y + 0.5 * room.y), em(0.45 + 0.5 * wide), color)
     plans = state.view.plans
     left = type(plans[0].method).__name__ if plans[0] is not None else display.method
-    right = {"reference": "float64 reference", "error": "thickness less the reference"}
+    right = {"reference": "float64 reference", "error": "thickness minus the reference"}
     right |= {"method": display.method_b, "snapshot": f"snapshot {display.snapshot}"}
     name = right[display.compare]
     if display.compare == "snapshot":
         left = "now"
         if state.work.document.snapshot(display.snapshot) is None:
-            name = "no snapshot: keep one with Shift 1"
+            name = "no snapshot; store a snapshot with Shift 1"
     if display.compare == "method" and plans[1] is not None:
         name = type(plans[1].method).__name__
     if display.compare in ("reference", "error"):
@@ -214,7 +214,7 @@ def _error_scale(state: WindowState, over: imgui.ImDrawList, end: ImVec2) -> Non
     width, height, line = em(18.0), em(0.8), imgui.get_text_line_height()
     left, top = end.x - width - em(1.4), end.y - em(1.6) - height - line
     over.add_rect_filled(ImVec2(left - em(0.6), top - 1.3 * line), ImVec2(end.x - em(0.6), end.y - em(0.7)), SHADE)
-    over.add_text(ImVec2(left, top - 1.2 * line), WHITE, f"error of thickness, {unit}; orange: not valid")
+    over.add_text(ImVec2(left, top - 1.2 * line), WHITE, f"error of thickness, {unit}; orange: invalid")
     _color_bar(over, left, top, width, [error_color(2.0 * (i + 0.5) / 48 - 1.0) for i in range(48)])
     for fraction, text in ((0.0, f"-{most:.2g}"), (0.5, "0"), (1.0, f"+{most:.2g}")):
         wide = imgui.calc_text_size(text).x
@@ -378,7 +378,11 @@ def probe_lines(state: WindowState, position: tuple[float, float]) -> list[str]:
     with np.errstate(under="ignore"):
         passed = np.exp(-np.asarray(probe.optical_depth))
     plan = state.view.plans[1 if right else 0]
-    why = "; ".join(plan.limits) if plan is not None and plan.limits else "its surfaces do not balance"
+    why = (
+        "; ".join(plan.limits)
+        if plan is not None and plan.limits
+        else ("rays do not leave each body as often as they enter")
+    )
     lines = [
         f"thickness {length_text(probe.thickness, display.unit)}",
         f"sigma_t d {triple_text(probe.optical_depth)}",
