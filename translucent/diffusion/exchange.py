@@ -308,7 +308,7 @@ class Exchange:
 
 @dataclass(frozen=True, eq=False)
 class GroundMap:
-    """Irradiance on a flat ground by bodies: light that they send minus light that they block, see ``ground_light.glsl``.
+    """Irradiance on a flat ground by bodies: light that they send minus light that they block (``ground_light.glsl``).
 
     Attributes
     ----------
