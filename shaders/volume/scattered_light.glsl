@@ -47,7 +47,8 @@ vec3 environment_ahead(int slot, vec3 direction, vec3 depth) {
     float first = scattered_grid[slot].w + 9.0 * scattered_grid[slot].z;
     vec2 at = vec2(1.0 + AHEAD_WIDTH * fract(uv.x), clamp(AHEAD_HEIGHT * uv.y, 0.5, AHEAD_HEIGHT - 0.5));
     vec3 level = sqrt(min(depth / deepest, vec3(1.0))) * (AHEAD_DEPTHS - 1.0) + 0.5 + first;
-    return vec3(
+    vec3 scattered = transmittance((1.0 - scattered_ahead[slot].y) * depth) - transmittance(depth);
+    return scattered * vec3(
         textureLod(scattered_light, vec3(at, level.r) / size, 0.0).r,
         textureLod(scattered_light, vec3(at, level.g) / size, 0.0).g,
         textureLod(scattered_light, vec3(at, level.b) / size, 0.0).b

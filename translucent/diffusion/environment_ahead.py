@@ -25,13 +25,16 @@ DEPTHS, HEIGHT, WIDTH = 16, 32, 64
 #: Attenuation of the lowest Legendre moments, as an exponent, beyond which nothing is left.
 _GONE = 4.0
 
+#: Optical depth that stands for none, at which the ratio has a limit.
+_NO_DEPTH = 1e-6
+
 #: Most events on a path that differ from many, and the mean cosine after them from which on they do.
 _MOST_EVENTS, _LEAST_POWER = 128, 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentAhead:
-    """Radiance along rays by light that was scattered forward.
+    """Radiance along rays by light that was scattered forward, over exp(-(1 - straight) depth) - exp(-depth).
 
     A Legendre moment of order l > 2 of the environment is multiplied by exp(-(1 - g^l) depth) - exp(-depth): as by a
     Poisson number n > 0 of events, of g^n together. Of lower orders cells hold what has turned, and 1 - g^l is the
@@ -73,12 +76,13 @@ def environment_ahead(environment: Environment, anisotropy: float, straight: flo
     blurred = [convolved(fine, partial(henyey_greenstein, anisotropy=anisotropy**n)) for n in events]
     found = np.zeros((DEPTHS, HEIGHT, WIDTH, 3))
     for i, depth in enumerate(deepest * (np.arange(DEPTHS) / (DEPTHS - 1)) ** 2):
-        probability = np.exp(-depth)
-        found[i] = (np.exp((straight - 1.0) * depth) - probability) * (mean + gradient + curvature)
+        depth = max(depth, _NO_DEPTH)
+        ratio = 1.0 / np.expm1(straight * depth)
+        found[i] = mean + gradient + curvature
         for n, picture in zip(events, blurred, strict=True):
-            probability *= depth / n
+            ratio *= depth / n
             power = anisotropy**n
-            found[i] += probability * (picture - mean - power * gradient - power**2 * curvature)
+            found[i] += ratio * (picture - mean - power * gradient - power**2 * curvature)
     wrapped = np.concatenate([found[:, :, -1:], found, found[:, :, :1]], axis=2)
     return EnvironmentAhead(np.ascontiguousarray(wrapped.transpose(2, 1, 0, 3), np.float32), deepest)
 
