@@ -128,9 +128,7 @@ def _read(path: Path, allow_outside: bool) -> Triangles:
     require_file(path, asked)
     if path.suffix[1:].lower() not in _GLTF and path.suffix[1:].lower() not in mesh_formats():
         do = (
-            "export the model as .glb"
-            if path.suffix.lower() in _SCENES_OF_PROGRAMS
-            else "use glb, gltf, obj, stl, ply or off"
+            "export it as .glb" if path.suffix.lower() in _SCENES_OF_PROGRAMS else "use glb, gltf, obj, stl, ply or off"
         )
         raise InputError(asked, f"the mesh format {path.suffix or 'without suffix'!r} is not supported", do)
     return read_triangles(path, asked, allow_outside)

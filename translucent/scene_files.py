@@ -432,9 +432,7 @@ class _SceneFile:
         self._check(self.tree, _SCENE_KEYS, "")
         tables = self.tree.get("object", [])
         if not (isinstance(tables, list) and tables and all(isinstance(one, dict) for one in tables)):
-            raise self._wrong(
-                "", 0, "object", "the file has no list of objects", "write [[object]], and model = ... below it"
-            )
+            raise self._wrong("", 0, "object", "no list of objects", "write [[object]], and model = ... below it")
         loaded = [self._object(values, i) for i, values in enumerate(tables)]
         more: dict[str, Any] = {"lights": [self._light(values, i) for i, values in enumerate(self._lights())]}
         if "overlap" in self.tree:
@@ -492,9 +490,7 @@ class _SceneFile:
 
     def _light(self, values: dict[str, Any], number: int) -> Light:
         if (kind := values.get("type")) not in _LIGHTS:
-            raise self._wrong(
-                "light", number, "type", f"no light has the type {kind!r}", f"use one of {', '.join(_LIGHTS)}"
-            )
+            raise self._wrong("light", number, "type", f"unknown type {kind!r}", f"use one of {', '.join(_LIGHTS)}")
         made = _LIGHTS[str(kind)]
         given = {key: value for key, value in values.items() if key != "type"}
         self._check(given, [one.name for one in fields(made) if one.name != "disc"], "light", number)

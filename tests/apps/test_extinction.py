@@ -379,7 +379,10 @@ def test_a_black_channel_is_clamped_on_a_model_too(run: Run, plate: Path) -> Non
             ["black", "--no-clamp", *PLATE],
             "average color with red = 0; the value must satisfy 0.0001 <= t <= 1; use 0.0001 or more",
         ),
-        (["linear(1.5,1,1)", *PLATE], "red = 1.5; the value must satisfy 0.0001 <= t <= 1; use a color below 1"),
+        (
+            ["linear(1.5,1,1)", *PLATE],
+            "red = 1.5; the value must satisfy 0.0001 <= t <= 1; a medium cannot amplify light",
+        ),
         (["gray", "--on", "none.obj"], "none.obj"),
         (
             ["gray", "--on", "bear", "--unit", "cm"],

@@ -155,7 +155,7 @@ OBJECT = '[[object]]\nmodel = "sphere"\n'
         (OBJECT + "surface = { roughnes = 1 }\n", "line 3, roughnes; unknown key 'roughnes'; did you mean roughness"),
         (
             OBJECT + "[[light]]\ntype = 'lamp'\n",
-            "line 4, type; no light has the type 'lamp'; use one of directional, point, sphere",
+            "line 4, type; unknown type 'lamp'; use one of directional, point, sphere",
         ),
         (OBJECT + "[[light]]\ntype = 'point'\nposition = [0, 0, 0]\n", "line 4, type; a point light; "),
         ("stage = 'nigth'\n" + OBJECT, "line 1, stage; stage 'nigth'; no stage has this name; did you mean night?"),

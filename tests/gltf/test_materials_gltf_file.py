@@ -204,7 +204,7 @@ def test_a_glb_holds_its_images_wherever_they_were(two_boxes: Path, tmp_path: Pa
         (
             "secret.txt",
             b"root:x:0",
-            "'secret.txt' is not a picture of a format that glTF supports; the image stays a link",
+            "glTF does not support the format of 'secret.txt'; it stays a link",
         ),
     ],
 )

@@ -157,4 +157,4 @@ def test_two_holes_ahead_of_an_eye_outside_do_not_cancel_where_the_planner_choos
         frame = renderer.render(found, (24, 24))
     assert frame.coverage.all()
     assert not frame.valid.any()
-    assert any("2 holes, and SignedDepth may miss" in note for note in tl.plan(found, tl.SignedDepth()).limits)
+    assert any("2 holes: SignedDepth may miss" in note for note in tl.plan(found, tl.SignedDepth()).limits)

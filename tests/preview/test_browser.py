@@ -129,7 +129,7 @@ def test_environments_of_a_folder(tmp_path: Path, state: Any) -> None:
     (tmp_path / "empty").mkdir()
     shown.take(str(tmp_path / "empty"))
     assert shown.files() == []
-    assert "no file with the suffix .hdr or .exr or .pic in this folder" in shown.problem
+    assert "no .hdr or .exr or .pic file" in shown.problem
     shown.take(str(tmp_path / "gone"))
     assert (shown.files(), "No such file" in shown.problem) == ([], True)
     assert (title(""), title("studio"), title(str(tmp_path / "a.HDR"))) == ("own", "studio", "a")

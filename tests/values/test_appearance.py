@@ -71,7 +71,7 @@ def test_a_darker_target_needs_more_extinction() -> None:
     [
         ([0.1], (0.0, 0.5, 0.5), r"red = 0; the value must satisfy 0\.0001 <= t <= 1; use 0.0001 or more"),
         ([0.1], (0.5, 5e-5, 0.5), "green = 5e-05; the value must satisfy"),
-        ([0.1], (0.5, 0.5, 1.5), "blue = 1.5; .*use a color below 1: a medium cannot amplify light"),
+        ([0.1], (0.5, 0.5, 1.5), "blue = 1.5; .*a medium cannot amplify light"),
         ([0.0, 0.1], (0.5, 0.9, 0.9), "red = 0.5; 50 % of the pixels have a thickness of 0 and stay white"),
         ([0.0, 0.0], (0.9,) * 3, "100 % of the pixels have a thickness of 0"),
         ([1e-320], (0.5,) * 3, "so thin that the extinction overflows"),

@@ -137,7 +137,7 @@ def test_what_is_no_line_and_photographs_that_differ_are_told() -> None:
 def test_steps_that_are_named_in_reverse_are_told(ior: float | None) -> None:
     reverse = [(where, float(d)) for (where, _), d in zip(PATCHES, STEPS[::-1], strict=True)]
     with pytest.raises(
-        tl.InputError, match=r"all channels become brighter where the plate is thicker.*list the thicknesses from left"
+        tl.InputError, match=r"all channels are brighter where the plate is thicker.*list the thicknesses from left"
     ):
         fit_photographs([Photograph(photograph(np.random.default_rng(3)), WHITE, reverse)], ior)
 
@@ -192,7 +192,7 @@ def test_a_toml_file_names_photographs(tmp_path: Path) -> None:
         (WHITE, [((0, 9, SIDE, SIDE), 0.001)], 0.8, "the rectangle lies outside the picture of 144 x 24 pixels"),
         (WHITE, [((-1, 0, SIDE, SIDE), 0.001)], 0.8, "the rectangle lies outside the picture of"),
         (WHITE, [((0, 0, 3, 9), 0.001)], 0.8, "3 x 9 pixels; use a rectangle of at least 4 x 4 pixels"),
-        (PATCHES[1][0], PATCHES, 0.8, "patch 24,0,24,24 of steps.png; red .* is brighter than the white rectangle"),
+        (PATCHES[1][0], PATCHES, 0.8, "patch 24,0,24,24 of steps.png; red .* is brighter than white"),
         (
             WHITE,
             PATCHES,

@@ -142,7 +142,7 @@ def test_convex_is_what_back_face_depth_is_exact_for() -> None:
             0,
             "2 bodies in one unsorted draw each: distances of exits minus",
         ),
-        ([body()], None, -1, "Beer-Lambert: what is behind, through exp(-optical depth)"),
+        ([body()], None, -1, "Beer-Lambert: light from behind, times exp(-optical depth)"),
         (
             [body(FIRE)],
             None,
@@ -153,20 +153,20 @@ def test_convex_is_what_back_face_depth_is_exact_for() -> None:
             [body(FIRE), body(WINE)],
             None,
             -1,
-            "Beer-Lambert: light from behind the media, times exp(-optical depth), plus the",
+            "Beer-Lambert: light from behind, times exp(-optical depth), plus the",
         ),
         (
             [sheet()],
             None,
             0,
-            "every face of 1 mesh is a sheet: their path lengths are summed, t / max(0.001, n.v) each",
+            "every face of 1 mesh is a sheet: sum of their paths, t / max(0.001, n.v) each",
         ),
-        ([sheet(), sheet()], None, 0, "every face of 2 meshes is a sheet: their path lengths are summed"),
+        ([sheet(), sheet()], None, 0, "every face of 2 meshes is a sheet: sum of their paths"),
         (
             [body(), sheet()],
             None,
             1,
-            "1 mesh, thin-walled: the path lengths through all faces are summed, t / max(0.001, n.v) each",
+            "1 mesh, thin-walled: sum of paths through all faces, t / max(0.001, n.v) each",
         ),
         (
             [body(), body(None)],

@@ -62,11 +62,7 @@ def attach(
     """
     known = OF_FRAMES if isinstance(result, Frame) else tuple(OF_BAKES)
     if quantity not in known:
-        raise InputError(
-            f"quantity {quantity!r} of {type(result).__name__}",
-            "no quantity has this name",
-            f"use {', '.join(known)}",
-        )
+        raise InputError(f"quantity {quantity!r} of {type(result).__name__}", "unknown", f"use {', '.join(known)}")
     held = getattr(mesh, "vertex_attributes", None)
     held = getattr(mesh, "point_data", None) if held is None else held
     parts = None if is_scene(mesh) else foreign_parts(mesh)

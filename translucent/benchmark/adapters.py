@@ -241,9 +241,7 @@ def _blender(engine: str, samples: int, title: str, settings: str, features: fro
 
     def missing() -> str:
         if python:
-            return (
-                "" if shutil.which(python) else f"BLENDER_PYTHON is {python!r}, which is not a program; name a Python"
-            )
+            return "" if shutil.which(python) else f"BLENDER_PYTHON={python!r} is not a program; name a Python"
         if importlib.util.find_spec("bpy") is None:
             return "bpy is not installed; pip install bpy, or set BLENDER_PYTHON to a Python with bpy"
         return ""
@@ -369,9 +367,7 @@ def _gvxr() -> Adapter:
 
 
 def _pyrender() -> Adapter:
-    """Adapter of the rasterizer pyrender: each body has one opacity and one emission, so a white background gets the
-    color of the body.
-    """
+    """Adapter of the rasterizer pyrender, in which each body has one opacity and one emission."""
 
     def missing() -> str:
         found = importlib.util.find_spec("pyrender") is not None
@@ -440,12 +436,7 @@ _NOT_NESTED = ALL - {"nesting", "sheets"}
 
 _ADAPTERS: tuple[Adapter, ...] = (
     _ours("ours", "translucent", "default settings, 16 samples per pixel", samples=16),
-    _ours(
-        "ours-quick",
-        "translucent, 1 sample",
-        "default settings, 1 sample per pixel",
-        samples=1,
-    ),
+    _ours("ours-quick", "translucent, 1 sample", "default settings, 1 sample per pixel", samples=1),
     _ours(
         "ours-screen",
         "translucent, screen space",

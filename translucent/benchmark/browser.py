@@ -65,9 +65,7 @@ class WebRenderer:
             return "Chromium is not installed; apt-get install chromium, or set CHROMIUM to its path"
         absent = [name for name in self.npm() if not (npm_folder() / "node_modules" / name).is_dir()]
         if absent:
-            return (
-                f"{', '.join(absent)} missing in {npm_folder()}; npm install --prefix {npm_folder()} {' '.join(absent)}"
-            )
+            return f"{', '.join(absent)} not in {npm_folder()}; npm install --prefix {npm_folder()} {' '.join(absent)}"
         if importlib.util.find_spec("playwright") is None:
             return "playwright is not installed; pip install playwright"
         return ""

@@ -283,9 +283,7 @@ def read_thickness(folder: Path, scene: BenchmarkScene) -> Array | None:
     found = next(iter(read_exr(path, asked)[1].values())) if path.suffix == ".exr" else _npy(path, asked)
     array = np.asarray(found, np.float64)
     if array.shape != scene.size[::-1]:
-        raise InputError(
-            asked, f"the array has the shape {array.shape}", f"render {scene.size[1]} rows of {scene.size[0]}"
-        )
+        raise InputError(asked, f"its shape is {array.shape}", f"render {scene.size[1]} rows of {scene.size[0]}")
     return array
 
 

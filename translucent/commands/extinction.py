@@ -336,9 +336,7 @@ def _fitted_to_table(given: ExtinctionOptions) -> tuple[Medium, float, dict[str,
     fit = fit_wedge(given.fit[0], given.unit)
     distance = float(np.median(fit.distances))
     reported = summary(fit.medium.transmittance(distance), distance, fit.medium.extinction, given.unit_out)
-    reported["warnings"][:0] = [
-        f"{name} brightens with distance, so its extinction is set to 0" for name in fit.clipped
-    ]
+    reported["warnings"][:0] = [f"{name} brightens with distance, so its extinction is 0" for name in fit.clipped]
     error = None if fit.standard_error is None else fit.standard_error.tolist()
     reported |= {"samples": len(fit.distances), "standard_error": error, "residuals": fit.residuals.tolist()}
     known = "unknown (a single sample)" if fit.standard_error is None else f"{triple_text(fit.standard_error)} 1/m"

@@ -521,8 +521,7 @@ def stage_option() -> Any:
 def ground_option() -> Any:
     """Option for the color of the stage's ground."""
     words = (
-        "Color of the stage's ground; none: no ground. For shadows without a ground: --transparent. Default: the "
-        "color of the stage."
+        "Color of the stage's ground; none: no ground. For shadows without a ground: --transparent. Default: by stage."
     )
     return option(metavar="C", help=words)
 

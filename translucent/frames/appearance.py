@@ -191,11 +191,7 @@ def medium_for_average_color(seen: Frame | npt.ArrayLike, color: str | npt.Array
 
 def _solve(thickness: Array, name: str, target: float) -> float:
     if not CLAMP <= target <= 1:
-        do = (
-            "use a color below 1: a medium cannot amplify light"
-            if target > 1
-            else (f"use {CLAMP:g} or more: darker colors look black on any display")
-        )
+        do = "a medium cannot amplify light" if target > 1 else f"use {CLAMP:g} or more: darker colors look black"
         raise InputError(f"average color with {name} = {target:g}", f"the value must satisfy {CLAMP:g} <= t <= 1", do)
     if target == 1:
         return 0.0

@@ -284,10 +284,7 @@ def _depth(patch: _Mean, white: _Mean, what: str, left_out: list[str]) -> tuple[
     bright = patch.mean > white.mean + 5.0 * np.sqrt(patch.variance + white.variance) + 0.02 * white.mean
     if (bright & (patch.saturated <= MOST_LIMITED)).any():
         channel = int(np.flatnonzero(bright)[0])
-        found = (
-            f"{CHANNELS[channel]} {patch.mean[channel]:.3g} is brighter than the white rectangle, "
-            f"{white.mean[channel]:.3g}"
-        )
+        found = f"{CHANNELS[channel]} {patch.mean[channel]:.3g} is brighter than white, {white.mean[channel]:.3g}"
         raise InputError(
             what, found, "choose a white rectangle beside the patches, where the bare backlight is visible"
         )

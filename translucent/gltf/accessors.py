@@ -121,9 +121,7 @@ class Accessors:
         stride = view.whole("byteStride", element)
         end = offset + stride * (count - 1) + element
         if count < 1 or stride < element or end > length or start + length > len(data):
-            raise self.file.refused(
-                f"{entry.where} reaches beyond the end of its buffer", "copy or export the file again"
-            )
+            raise self.file.refused(f"{entry.where} exceeds its buffer", "copy or export the file again")
         return np.ndarray((count, width), dtype, data, start + offset, (stride, dtype.itemsize))
 
 

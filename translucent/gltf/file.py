@@ -97,9 +97,7 @@ class GltfFile:
             whole = self.buffer(view.get("buffer"))
             start, length = view.get("byteOffset", 0), view.get("byteLength", 0)
             if not (isinstance(start, int) and isinstance(length, int) and 0 <= start <= start + length <= len(whole)):
-                raise self.refused(
-                    "a buffer view reaches beyond the end of its buffer", "copy or export the file again"
-                )
+                raise self.refused("a buffer view exceeds its buffer", "copy or export the file again")
             return bytes(whole[start : start + length])
         return bytes(self._content(holder))
 
@@ -320,10 +318,7 @@ def embed_images(file: GltfFile, tree: Json, binary: bytearray) -> None:
         if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
             kind = "image/webp"
         if kind is None:
-            text = (
-                f"glTF {str(file.path)!r}: {image['uri']!r} is not a picture of a format that glTF supports; the "
-                "image stays a link"
-            )
+            text = f"glTF {str(file.path)!r}: glTF does not support the format of {image['uri']!r}; it stays a link"
             warnings.warn(text, TranslucentWarning, stacklevel=5)
             continue
         _make_view(tree, index, _append(binary, data), len(data), kind)

@@ -370,7 +370,7 @@ def _camera(fields: JsonFields, pose: Array, metres: float) -> Camera:
     if kind == "perspective":
         angle = math.degrees(fields.section(kind).number("yfov"))
         if not 0 < angle < 180:
-            fields.refuse(f"yfov of {angle:g} degrees is not between 0 and 180", "mend the file")
+            fields.refuse(f"yfov of {angle:g} degrees is not between 0 and 180", "correct the file")
         return Camera(pose, fov_y=angle)
     if kind == "orthographic":
         return Camera(pose, fov_y=None, height=2.0 * metres * fields.section(kind).number("ymag", low=0.0, above=True))
@@ -420,7 +420,7 @@ def _light(fields: JsonFields, matrix: Array, metres: float) -> Light:
     color = np.array(fields.numbers("color", (1.0, 1.0, 1.0)))
     strength = fields.number("intensity", 1.0)
     if strength < 0 or (color < 0).any():
-        fields.refuse(f"the intensity {strength:g} or the color {color.tolist()} is below 0", "mend the file")
+        fields.refuse(f"the intensity {strength:g} or the color {color.tolist()} is below 0", "correct the file")
     kind = fields.values.get("type")
     if kind not in ("point", "directional", "spot"):
         fields.refuse(f"the type {kind!r} is not point, directional or spot")
@@ -438,8 +438,6 @@ def _cones(spot: JsonFields) -> tuple[float, float]:
     # A right angle of float32 is a little more.
     degrees = math.degrees(inner), min(math.degrees(outer), 90.0) if outer < _RIGHT_ANGLE else math.degrees(outer)
     if not (0.0 <= degrees[0] < degrees[1] <= 90.0 and degrees[1] >= NARROWEST_CONE):
-        found = (
-            f"innerConeAngle is {inner:g} and outerConeAngle is {outer:g}, but 0 <= inner < outer <= pi / 2 must hold"
-        )
-        spot.refuse(found, "mend the file")
+        found = f"innerConeAngle {inner:g} and outerConeAngle {outer:g} must satisfy 0 <= inner < outer <= pi / 2"
+        spot.refuse(found, "correct the file")
     return degrees

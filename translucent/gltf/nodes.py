@@ -271,9 +271,7 @@ def posed(file: GltfFile, seconds: float, left_out: LeftOut) -> GltfFile:
                 continue
             file.item("nodes", node)
             if "matrix" in moved[node] and path != "weights":
-                raise file.refused(
-                    f"animation {name} moves node {label(moved, node)}, but a node with a matrix cannot be animated"
-                )
+                raise file.refused(f"animation {name} moves node {label(moved, node)}, although it has a matrix")
             if (node, path) in taken:
                 left_out.add(f"animations of a property that another animation moves ({path})", name)
                 continue
@@ -315,9 +313,7 @@ def _value(
     if path == "weights" and len(times) and len(values) % (per_key * len(times)) == 0:
         values = values.reshape(per_key * len(times), -1)  # of all targets at a key
     if len(values) != per_key * len(times) or not (np.isfinite(times).all() and np.isfinite(values).all()):
-        raise file.refused(
-            f"animation {name}: {len(values)} values for {len(times)} keys, or a value that is not finite"
-        )
+        raise file.refused(f"animation {name}: {len(values)} values for {len(times)} keys, or a value is not finite")
     if (np.diff(times) <= 0).any():
         raise file.refused(f"animation {name}: the keys are not in ascending order of time")
     found = sampled_channel(times, values.reshape(len(times), per_key, -1), seconds, mode, arc=path == "rotation")

@@ -489,9 +489,7 @@ class Deformer:
             if weight and "POSITION" in target:
                 offsets = self._accessors.vectors(target["POSITION"], "VEC3")
                 if offsets.shape != positions.shape:
-                    raise self._file.refused(
-                        f"a morph target has {len(offsets)} positions, but the mesh has {len(positions)}"
-                    )
+                    raise self._file.refused(f"a morph target has {len(offsets)} of {len(positions)} positions")
                 moved += weight * offsets
         return moved
 
@@ -506,9 +504,7 @@ class Deformer:
             if len(joints) != len(positions) or weights.shape != joints.shape:
                 raise self._file.refused(f"JOINTS_{number} or WEIGHTS_{number} has another length than the vertices")
             if joints.min(initial=0) < 0 or (joints[weights != 0] >= len(matrices)).any():
-                raise self._file.refused(
-                    f"skin {index}: a vertex refers to a joint beyond the {len(matrices)} joints of the skin"
-                )
+                raise self._file.refused(f"skin {index}: a vertex refers to a joint beyond its {len(matrices)} joints")
             for joint, weight in zip(joints.T, weights.T, strict=True):
                 blended += weight[:, None, None] * matrices[np.minimum(joint, len(matrices) - 1)]
                 total += weight

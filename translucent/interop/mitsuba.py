@@ -459,10 +459,7 @@ def _beyond(scene: Scene) -> Iterator[tuple[str, str]]:
     if np.asarray(scene.ambient).any():
         yield "ambient radiance stands for light that path tracing finds itself", "omit ambient"
     if scene.environment.kind == "checkerboard":
-        yield (
-            "the checkerboard environment belongs to the picture, not to directions",
-            "use tl.Environment.image or gradient",
-        )
+        yield "a checkerboard environment has no directions", "use tl.Environment.image or gradient"
     if scene.environment.background is not None:
         yield "the visible background differs from the environment that lights the scene", "omit the background"
     if scene.camera.window is not None:

@@ -301,9 +301,7 @@ def _channel_doubt(name: str, value: float) -> str | None:
         percent = 100 * 0.5 * 2.4 / 1.055 / 255 * float(condition_number(value))
         return f"{name} {value:g} is near white: rounding to 8 bits changes the extinction by up to {percent:.0f} %"
     if value < NEAR_BLACK:
-        return (
-            f"{name} {value:g} is near black: 8 bits hardly distinguish it from 0, which needs an infinite extinction"
-        )
+        return f"{name} {value:g} is near black: 8 bits hardly distinguish it from 0, with an infinite extinction"
     return None
 
 

@@ -169,9 +169,7 @@ def fit_steps(photographs: Sequence[PatchTransmittances], ior: float | None = No
     slopes = [_slope(samples) for samples in channels]
     if min(slopes) < 0 and max(slopes) <= 0:
         which = [name for name, slope in zip(CHANNELS, slopes, strict=True) if slope < 0]
-        who = (
-            "all channels become" if len(which) == 3 else f"{' and '.join(which)} {'is' if len(which) == 1 else 'are'}"
-        )
+        who = "all channels are" if len(which) == 3 else f"{' and '.join(which)} {'is' if len(which) == 1 else 'are'}"
         rest = "" if len(which) == 3 else ", and no channel is darker"
         do = "list the thicknesses from left to right, or from top to bottom in an upright patch"
         raise InputError(

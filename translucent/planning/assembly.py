@@ -160,10 +160,7 @@ def _touching(scene: Scene, method: Method, interfaces: InterfaceMode) -> tuple[
         return ()
     if (touching := touching_interfaces(scene)) is None:
         return ()
-    text = (
-        f"{touching}; {type(method).__name__} does not know this order, and treats the interface between the "
-        "bodies as the last"
-    )
+    text = f"{touching}; {type(method).__name__} lacks this order, and treats the interface between them as the last"
     return (Note(NoteKind.TOUCHING_INTERFACES, text),)
 
 
@@ -190,11 +187,7 @@ def _limits(scene: Scene, method: Method) -> tuple[Note, ...]:
 def _declared_sheets(scene: Scene) -> tuple[PassSpec, ...]:
     if not (sheets := sheets_of(scene)):
         return ()
-    return (
-        sheet_pass(
-            sheets, f"{count_of(sheets, 'mesh', 'meshes')}, thin-walled: the path lengths through all faces are summed"
-        ),
-    )
+    return (sheet_pass(sheets, f"{count_of(sheets, 'mesh', 'meshes')}, thin-walled: sum of paths through all faces"),)
 
 
 def _fallback_passes(scene: Scene, spectral: bool) -> tuple[PassSpec, ...]:
@@ -249,11 +242,9 @@ def _opaque_passes(scene: Scene) -> tuple[PassSpec, ...]:
 def _shading(scene: Scene, method: Method, *, ambient: bool) -> str:
     """Description of how path lengths become radiance."""
     if not any(body.medium is not None and body.medium.emits for body in scene.bodies):
-        found = "Beer-Lambert: what is behind, through exp(-optical depth)"
+        found = "Beer-Lambert: light from behind, times exp(-optical depth)"
     elif method.ordered:
-        found = (
-            "Beer-Lambert: light from behind the media, times exp(-optical depth), plus the emission of the intervals"
-        )
+        found = "Beer-Lambert: light from behind, times exp(-optical depth), plus the emission of the intervals"
     else:
         found = "Beer-Lambert, plus the emission of the single medium in closed form, q / sigma_t (1 - T)"
     return f"{found}; {AMBIENT}" if ambient else found

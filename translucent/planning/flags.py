@@ -21,6 +21,5 @@ class Flags:
 
     adaptive: bool = _flag(
         True,
-        "Stop sampling a pixel when more samples no longer change it, or always trace all samples. Default: "
-        "--adaptive.",
+        "Stop when more samples no longer change a pixel, or always trace all samples. Default: --adaptive.",
     )

@@ -62,13 +62,12 @@ def hole_limits(scene: Scene, method: Method) -> list[Note]:
         if i in around:
             text = f"the eye is within the bounds of this open mesh, so {name} marks all its pixels as invalid"
         elif mesh.diagnosis.holes > 1:
-            text = (
-                f"the mesh has {mesh.diagnosis.holes} holes, and {name} may miss rays through two holes, whose "
-                "errors cancel"
-            )
+            text = f"{mesh.diagnosis.holes} holes: {name} may miss rays through two holes, whose errors cancel"
         else:
             continue
-        notes.append(Note(NoteKind.OPEN_MESH, f"{mesh.name!r}: {text}; the method FragmentLists finds such rays"))
+        notes.append(
+            Note(NoteKind.OPEN_MESH, f"{mesh.name!r}: {text}; the method FragmentLists finds rays through two holes")
+        )
     return notes
 
 

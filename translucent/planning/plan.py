@@ -171,10 +171,7 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
     if request.caustics is not None:
         found = _with_caustics(found, scene, request.caustics, machine, "requested")
     elif (unrequested := _unrequested_caustics(found, scene, request, machine)) is not None:
-        why = (
-            f"a light, a clear body and a ground, and photons take less than {UNREQUESTED:.0%} of the time of the "
-            "picture"
-        )
+        why = f"a light, a clear body and a ground, and photons take less than {UNREQUESTED:.0%} of the time"
         found = _with_caustics(found, scene, unrequested, machine, why)
     elif paths is None:
         found = replace(found, unmodelled=(*found.unmodelled, *caustics_to_request(scene)))
@@ -415,9 +412,7 @@ def _traced(
         reason += f", in place of the requested {method}"
     if followed is not None and interfaces is not None and not interfaces.traced:
         reason += f"; and {followed} in place of {interfaces}"
-    shading = (
-        "sheets, sorted along each ray" if sheets else ("the intervals between the surfaces, in order and exactly")
-    )
+    shading = "sheets, sorted along each ray" if sheets else "the intervals between surfaces, in order and exactly"
     passes = (
         PassSpec(PassName.INTERSECT, reason, tuple(range(len(scene.objects))), 1),
         PassSpec(PassName.SHADE, f"{shading}; {AMBIENT}" if ambient else shading),

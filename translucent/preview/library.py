@@ -202,11 +202,7 @@ class EnvironmentFolder:
             if self._listed is None or self._listed[0] != key:
                 names = sorted(name for name in os.listdir(self.path) if name.lower().endswith(ENVIRONMENT_SUFFIXES))
                 self._listed = key, [os.path.join(self.path, name) for name in names[:MOST_FILES]]
-                self.problem = (
-                    ""
-                    if names
-                    else (f"{self.path}: no file with the suffix {' or '.join(ENVIRONMENT_SUFFIXES)} in this folder")
-                )
+                self.problem = "" if names else f"{self.path} has no {' or '.join(ENVIRONMENT_SUFFIXES)} file"
         except OSError as error:
             self.problem = f"{self.path}: {error.strerror}"
             return []

@@ -377,10 +377,7 @@ class WindowState:
 
         def give(number: int | None) -> None:
             if number is None:
-                self.work.tell(
-                    "warning",
-                    f"{name} was not assigned, because no object is at this point; drop the preset on an object",
-                )
+                self.work.tell("warning", f"{name} was not assigned: drop the preset on an object")
             else:
                 self.choose_preset(name, number if len(self.objects) > 1 else None)
 
@@ -615,10 +612,7 @@ class WindowState:
         recipe = Recipe(work.document, work.loaded, scene, self.view.viewport.size, self._caustics(scene))
         text, left_out = (python_code(recipe), []) if kind == "python" else command_line(recipe)
         if left_out:
-            work.tell(
-                "warning",
-                f"the copied command leaves out: {', '.join(left_out)}; the Python script contains these settings",
-            )
+            work.tell("warning", f"the copied command leaves out: {', '.join(left_out)}; Copy Python has them")
         else:
             work.tell("info", "copied as Python" if kind == "python" else "copied as a command")
         imgui.set_clipboard_text(text)

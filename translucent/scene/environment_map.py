@@ -54,9 +54,7 @@ class EnvironmentMap(Frozen):
         usable, doubts = _usable(given)
         if usable.shape[1] != 2 * usable.shape[0]:
             size = f"{usable.shape[1]}x{usable.shape[0]} pixels"
-            doubts.append(
-                f"{size}: a picture of all directions must be twice as wide as high, so this picture is stretched"
-            )
+            doubts.append(f"{size}: a picture of all directions is twice as wide as high, so this picture is stretched")
         for doubt in doubts:
             # The caller of tl.Environment.image, past this function, the constructor and `image`.
             warnings.warn(f"environment image: {doubt}", TranslucentWarning, stacklevel=5)

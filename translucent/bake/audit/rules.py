@@ -185,19 +185,11 @@ def _transport(material: GltfMaterial, entry: Json, extensions: Json) -> Iterato
         yield "double-sided", "warning", text, "remove doubleSided (--fix does)"
     for name in DRAFTS.values():
         if name in extensions and material.has_volume:
-            text = (
-                f"{name} is a draft: viewers that do not support it treat scattering as absorption, and show darker "
-                "colors"
-            )
+            text = f"{name} is a draft: viewers without it treat scattering as absorption, and show darker colors"
             yield "draft-extension", "note", text, "also check the material in a viewer without this extension"
     for name in EXCLUDED:
         if name in extensions and material.has_volume:
-            yield (
-                "excluded-extension",
-                "error",
-                f"{name} must not be used with {VOLUME}",
-                "remove one of them",
-            )
+            yield "excluded-extension", "error", f"{name} must not be used with {VOLUME}", "remove one of them"
 
 
 def _optics(material: GltfMaterial) -> Iterator[_Told]:
@@ -213,19 +205,9 @@ def _optics(material: GltfMaterial) -> Iterator[_Told]:
         return
     if material.ior == 1:
         text = "ior is 1: nothing is reflected or refracted, and three.js ignores the roughness in transmission"
-        yield (
-            "ior-one",
-            "note",
-            text,
-            "set the real ior (water 1.33, glass 1.5), unless 1 is intended",
-        )
+        yield "ior-one", "note", text, "set the real ior (water 1.33, glass 1.5), unless 1 is intended"
     elif material.ior == 0:
-        yield (
-            "ior-zero",
-            "note",
-            "ior 0 is for specular-glossiness materials",
-            "set the real ior",
-        )
+        yield "ior-zero", "note", "ior 0 is for specular-glossiness materials", "set the real ior"
     elif material.ior > LARGEST_IOR:
         text = f"ior {material.ior:g} is higher than that of any transparent material"
         yield "ior-large", "warning", text, "check the ior: even diamond has only 2.42"
@@ -387,10 +369,7 @@ def attenuation_findings(body: Body) -> Iterator[MaterialFinding]:
     if not reported and not USUAL[0] <= thick <= USUAL[1]:
         scale = 0.01 if thick > USUAL[1] else 100.0
         text = f"the body is {length_text(thick)} thick along view rays, an unusual size for a translucent body"
-        do = (
-            f"check the unit: glTF is in metres; for a thickness of {length_text(scale * thick)}, scale the node by "
-            f"{scale:g}"
-        )
+        do = f"check the unit: glTF is in metres; for {length_text(scale * thick)}, scale the node by {scale:g}"
         yield _found(body, "note", "size-unusual", text, do)
 
 
@@ -488,13 +467,7 @@ def _map_findings(body: Body) -> Iterator[MaterialFinding]:
         correlation = float(np.corrcoef(rankdata(stated), rankdata(true))[0, 1])
         if correlation < INVERTED:
             text = f"the thickness texture is dark where the mesh is thick (rank correlation {correlation:.2f})"
-            yield _found(
-                body,
-                "error",
-                "thickness-map-inverted",
-                text,
-                "invert it: white is thick (--fix bakes it)",
-            )
+            yield _found(body, "error", "thickness-map-inverted", text, "invert it: white is thick (--fix bakes it)")
             return
     below, above = np.minimum(body.beneath[finite], true), np.maximum(body.beneath[finite], true)
     off = float(np.mean((stated > WRONG * above) | (WRONG * stated < below)))

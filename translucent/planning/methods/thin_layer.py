@@ -54,9 +54,7 @@ class ThinLayer(Method):
         """Passes: one draw of all bodies."""
         bodies = indices(scene, lambda body: body.medium is not None)
         return (
-            sheet_pass(
-                bodies, f"every face of {count_of(bodies, 'mesh', 'meshes')} is a sheet: their path lengths are summed"
-            ),
+            sheet_pass(bodies, f"every face of {count_of(bodies, 'mesh', 'meshes')} is a sheet: sum of their paths"),
         )
 
     def limits(self, scene: Scene) -> list[Note]:

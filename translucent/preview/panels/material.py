@@ -55,14 +55,10 @@ SCATTER_TIP = (
 
 RADIUS_TIP = (
     "Mean free path: length after which light in the medium is scattered or absorbed, on average "
-    "(--mean-free-path). Large values let more light through, small values look like plaster. Typical: skin 0.3 "
-    "mm, wax 2 mm, jade 4 mm."
+    "(--mean-free-path). A large value lets more light through. Typical: skin 0.3 mm, wax 2 mm, jade 4 mm."
 )
 
-SAVE_TIP = (
-    "Save the medium, ior and roughness as a .toml file. To share this preset, others copy the file into "
-    "the same folder."
-)
+SAVE_TIP = "Save the medium, ior and roughness as a .toml file, which others can copy into their own folder of presets."
 
 
 def material_panel(state: WindowState) -> None:
@@ -197,10 +193,7 @@ def _object(state: WindowState) -> None:
             return "all without their own"
         return state.name_of(number) + (" *" if document.own_material(number) is not None else "")
 
-    ui.row(
-        "object",
-        "Click an object in the picture, or choose it here. Changes then apply only to the material of this object.",
-    )
+    ui.row("object", "Click an object in the picture, or choose it here, to change the material of this object alone.")
     numbers: list[int | None] = [None, *range(len(state.objects))]
     ui.combo(
         "object", name(target), ((f"{name(number)}##{number}", number) for number in numbers), target, state.select

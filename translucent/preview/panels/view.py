@@ -154,9 +154,7 @@ def _lights(state: WindowState) -> None:
 
 def _height(state: WindowState) -> None:
     """Field for the height of the model, with a unit."""
-    ui.row(
-        "height", "Height of the model with its unit, such as 12cm; then press Enter. Lengths of media do not change."
-    )
+    ui.row("height", "Write the height of the model, such as 12cm, and press Enter. Lengths of media do not change.")
     loaded = state.work.loaded
     if loaded is None:
         return ui.wrapped("no model yet", ui.FAINT)

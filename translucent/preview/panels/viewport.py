@@ -378,11 +378,7 @@ def probe_lines(state: WindowState, position: tuple[float, float]) -> list[str]:
     with np.errstate(under="ignore"):
         passed = np.exp(-np.asarray(probe.optical_depth))
     plan = state.view.plans[1 if right else 0]
-    why = (
-        "; ".join(plan.limits)
-        if plan is not None and plan.limits
-        else ("rays do not leave each body as often as they enter")
-    )
+    why = "; ".join(plan.limits) if plan is not None and plan.limits else "entries and exits of its ray differ"
     lines = [
         f"thickness {length_text(probe.thickness, display.unit)}",
         f"sigma_t d {triple_text(probe.optical_depth)}",
