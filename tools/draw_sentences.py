@@ -7,7 +7,7 @@ sentences before; the header of a table and the row; the verb and the option tha
 
 These texts are no sentences, and are never drawn:
 
-- headings, code, formulas, pictures, HTML, and the pages that a program writes;
+- headings, code, formulas, pictures, HTML, the pages that a program writes, and the list of sources;
 - texts of fewer than five words;
 - cells of a table that neither end in a full stop nor have a verb, such as "linear RGB, 1/m" (see `VERB`).
 
@@ -34,6 +34,9 @@ ROOT = Path(__file__).resolve().parents[1]
 
 #: Made by the build of the site; its tables have no sentences.
 MADE = ("generated", "gallery_of_examples")
+
+#: The list of sources, which has titles and no sentences.
+SOURCES = "sources.md"
 
 #: Calls whose texts a user reads, beside all calls that are raised.
 MESSAGES = {"InputError", "RenderError", "Note", "PassSpec", "TranslucentWarning", "warn"}
@@ -70,7 +73,10 @@ class Drawn:
 def pages() -> list[Path]:
     """Handwritten prose files: the README and the pages of the site."""
     docs = (ROOT / "docs").rglob("*.md")
-    return [ROOT / "README.md", *sorted(page for page in docs if page.relative_to(ROOT).parts[1] not in MADE)]
+    return [
+        ROOT / "README.md",
+        *sorted(page for page in docs if page.relative_to(ROOT).parts[1] not in MADE and page.name != SOURCES),
+    ]
 
 
 def prose(text: str) -> str:

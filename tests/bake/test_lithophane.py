@@ -97,9 +97,9 @@ def test_the_command_writes_what_slicers_read(run: Run, tmp_path: Path) -> None:
             (THICK, THIN),
             0.1,
             0.001,
-            "3 mm to 0.6 mm thick, 100 mm wide, with a point every 1 mm; give a smallest thickness, a larger",
+            "3 mm to 0.6 mm thick, 100 mm wide, with a point every 1 mm; use 0 < smallest < largest",
         ),
-        (tl.Medium(500.0), (THIN, THICK), 0.1, 0.1, "a width of several points"),
+        (tl.Medium(500.0), (THIN, THICK), 0.1, 0.1, "a width of two points or more"),
         (tl.Medium(500.0), (THIN, THICK), 1.0, 1e-5, "use a larger --pitch: at most 4000000 points are allowed"),
     ],
 )

@@ -197,7 +197,7 @@ def test_broken_keys_are_refused(tmp_path: Path, times: list[float], values: Any
 
 
 def test_other_broken_animations_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(tl.InputError, match="although it has a matrix"):
+    with pytest.raises(tl.InputError, match="whose matrix forbids that"):
         pose(animated("scale", [0], [[1, 1, 1]], matrix=np.eye(4).ravel().tolist()), tmp_path, 0)
     with pytest.raises(tl.InputError, match="a rotation has the length 0"):
         pose(animated("rotation", [0], [[0, 0, 0, 0]]), tmp_path, 0)

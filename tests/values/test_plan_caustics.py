@@ -141,7 +141,7 @@ def test_pictures_of_many_samples_have_caustics() -> None:
     wax = body(tl.Medium(1.0, 50.0, ior=1.4), 5.0)
     assert photons(16, scene(body(), body(None, 3.0), wax)) == photons(16, scene(body())) == 0.0
     text = str(plan_scene(scene(), RenderRequest(samples=32, pixels=10_000)))
-    assert "photons take less than 33% of the time of the picture" in text
+    assert "photons take less than 33% of the render time" in text
 
 
 def test_nobody_gets_caustics_unasked() -> None:

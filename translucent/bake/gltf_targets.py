@@ -311,7 +311,7 @@ def require_uncompressed(file: GltfFile) -> None:
     """Raise `InputError` if a file cannot be read without an extension that compresses its vertices."""
     required = file.tree.get("extensionsRequired", [])
     if packed := [name for name in COMPRESSIONS if name in required]:
-        raise file.refused(f"it requires {packed[0]}", "export it without compression")
+        raise file.refused(f"the file requires {packed[0]}", "export the file without compression")
 
 
 def _material(materials: list[GltfMaterial], primitive: Json) -> GltfMaterial | None:

@@ -141,7 +141,7 @@ def lithophane(
     if not (0 < least < largest < np.inf and 0 < pitch <= width / 2 < np.inf):
         thin, thick, wide_text, every = (f"{1e3 * metres:.6g} mm" for metres in (least, largest, width, pitch))
         found = f"{thin} to {thick} thick, {wide_text} wide, with a point every {every}"
-        raise InputError("lithophane", found, "give a smallest thickness, a larger one, and a width of several points")
+        raise InputError("lithophane", found, "use 0 < smallest < largest, and a width of two points or more")
     linear = read_picture(picture).linear if isinstance(picture, str | Path) else np.asarray(picture, dtype=np.float64)
     if linear.ndim != 3 or linear.shape[2] != 3 or not (linear.size and np.isfinite(linear).all()):
         found = f"the picture has the shape {linear.shape}, or numbers that are not finite"

@@ -478,6 +478,6 @@ def _solid(title: str, scene: Scene, _size: Size) -> Scene:
                 f"no method can render it as solid: {1.0 - look.valid[covered].mean():.0%} of its "
                 f"pixels are invalid; {wrong}"
             ),
-            "close it, or declare it thin-walled in a .glb file",
+            "close the mesh, or declare it thin-walled in a .glb file",
         )
     return scene

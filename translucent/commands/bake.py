@@ -645,8 +645,8 @@ def lithophane(picture: Path, given: LithophaneOptions, as_json: bool) -> None:
     In front of a light, thin parts of the plate appear bright, and thick parts appear dark. The thickest part of
     the plate shows black, the thinnest part shows white, and the luminance in between is proportional to PICTURE.
     The command then renders the plate in front of a uniform white light, and prints the difference from PICTURE.
-    The command assumes that light passes straight through the plate, so give the filament's --td, or a --color that
-    you saw in front of a light at a --distance.
+    The command assumes that light passes straight through the plate, so give the --td of the filament, or the --color
+    of light after a --distance in it.
     """
     from translucent.bake.lithophane import check_lithophane_output, lithophane
     from translucent.media.filament import medium_of_td

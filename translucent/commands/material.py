@@ -156,7 +156,7 @@ class CheckOptions:
 
     fix: bool = option(
         False,
-        help="Bake thickness for the materials in which it is wrong, write the file to OUTPUT, and check OUTPUT.",
+        help="Bake the thickness of materials whose thickness is wrong, write OUTPUT, and check OUTPUT.",
     )
     output: Path | None = option(names=("-o", "--output"), help="Output of --fix: a .glb file.")
     size: int = option(512, metavar="N", help="With --fix: number of texels along each side of a map.")

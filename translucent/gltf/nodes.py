@@ -271,7 +271,7 @@ def posed(file: GltfFile, seconds: float, left_out: LeftOut) -> GltfFile:
                 continue
             file.item("nodes", node)
             if "matrix" in moved[node] and path != "weights":
-                raise file.refused(f"animation {name} moves node {label(moved, node)}, although it has a matrix")
+                raise file.refused(f"animation {name} moves node {label(moved, node)}, whose matrix forbids that")
             if (node, path) in taken:
                 left_out.add(f"animations of a property that another animation moves ({path})", name)
                 continue

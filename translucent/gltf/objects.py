@@ -527,7 +527,7 @@ class Deformer:
             return world
         inverse = self._accessors.vectors(skin["inverseBindMatrices"], "MAT4")
         if len(inverse) < len(joints):
-            raise self._file.refused(f"skin {index}: {len(inverse)} inverse bind matrices for {len(joints)} joints")
+            raise self._file.refused(f"skin {index} has {len(inverse)} inverse bind matrices, but {len(joints)} joints")
         return np.asarray(world @ inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1))
 
 

@@ -270,9 +270,9 @@ def read_json(text: str) -> Medium:
     try:
         values = json_value(text)
     except ValueError as error:
-        raise InputError("medium as JSON", f"the JSON is broken ({error})", "write the medium again") from error
+        raise InputError("medium as JSON", f"the JSON is broken ({error})", "save the medium again") from error
     if not isinstance(values, dict):
-        raise InputError("medium as JSON", "the JSON is not an object", "write the medium again")
+        raise InputError("medium as JSON", "the JSON is not an object", "save the medium again")
     known = (*_TRIPLES, *_NUMBERS, _PHASE)
     if unknown := sorted(set(values) - set(known)):
         raise InputError(
@@ -283,7 +283,7 @@ def read_json(text: str) -> Medium:
     for field in _NUMBERS:
         if isinstance(number := values.get(field, 0), bool) or not isinstance(number, int | float):
             raise InputError(
-                "medium as JSON", f"the value of {field} is {number!r}, and not a number", "write the medium again"
+                "medium as JSON", f"the value of {field} is {number!r}, and not a number", "save the medium again"
             )
     if _PHASE in values:
         values[_PHASE] = parse_phase(str(values[_PHASE]))

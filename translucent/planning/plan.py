@@ -171,7 +171,7 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
     if request.caustics is not None:
         found = _with_caustics(found, scene, request.caustics, machine, "requested")
     elif (unrequested := _unrequested_caustics(found, scene, request, machine)) is not None:
-        why = f"a light, a clear body and a ground, and photons take less than {UNREQUESTED:.0%} of the time"
+        why = f"a light, a clear body and a ground; photons take less than {UNREQUESTED:.0%} of the render time"
         found = _with_caustics(found, scene, unrequested, machine, why)
     elif paths is None:
         found = replace(found, unmodelled=(*found.unmodelled, *caustics_to_request(scene)))

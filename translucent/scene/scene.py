@@ -147,7 +147,7 @@ class Object(Frozen):
             raise InputError(requested, found, "give either the material, or the medium and the surface")
         if not isinstance(material, Preset | str):
             do = 'give a preset or its name, such as "wax"; for a color, use tl.showcase(mesh, color, distance)'
-            raise InputError(requested, f"{type(material).__name__}", do)
+            raise InputError(requested, f"of type {type(material).__name__}", do)
         made = preset(material) if isinstance(material, str) else material
         object.__setattr__(self, "medium", made.medium)
         scale = 1.0 if self.transform is None else uniform_scale(self.transform)
