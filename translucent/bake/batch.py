@@ -119,8 +119,8 @@ def asset_line(asset: Record, width: int = 0) -> str:
     if found := asset.get("range"):
         text += f"  {found['min']:.4g} .. {found['max']:.4g} {asset['unit']}"
         text += f", {asset['parts']} parts" if asset["parts"] > 1 else ""
-    turned = [line for line in asset.get("repairs", []) if line.startswith("turned")]
-    return text + "".join(f"; {line}" for line in [*asset.get("doubts", []), *turned, *asset.get("warnings", [])])
+    flipped = [line for line in asset.get("repairs", []) if line.startswith("flipped")]
+    return text + "".join(f"; {line}" for line in [*asset.get("doubts", []), *flipped, *asset.get("warnings", [])])
 
 
 @checked
