@@ -500,7 +500,7 @@ class BodyGrid:
 
 @dataclass(frozen=True, eq=False)
 class MatrixPattern:
-    """Places of the numbers in the linear system of a grid: a cell has some for itself and for cells around it.
+    """Sparsity pattern of the linear system of a grid: entries for each cell and its neighbors.
 
     Attributes
     ----------

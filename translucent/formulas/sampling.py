@@ -1,4 +1,4 @@
-"""Positions of samples within a pixel, and its footprint on rays that bend.
+"""Positions of samples within a pixel, and the footprint of a pixel on refracted rays.
 
 Positions are low-discrepancy points. Differentials of rays are those of Igehy 1999, "Tracing ray differentials". The
 environment is averaged over an ellipse of directions by lookups along its longer axis (McCormack et al. 1999, "Feline:

@@ -1,1 +1,1 @@
-"""Rendering with OpenGL: the only room that touches it."""
+"""Rendering with OpenGL, which no other package uses."""

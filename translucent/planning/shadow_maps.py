@@ -72,7 +72,7 @@ def shadows_left_out(units: int) -> tuple[Note, ...]:
 
 
 def dims_interfaces(scene: Scene) -> bool:
-    """True if a body may be between a light and an interface, of another one or its own."""
+    """True if a body may shadow an interface of another body, or its own."""
     dense = (body for body in scene.bodies if not body.covers and body.medium and (body.medium.extinction > 0).any())
     return bool(scene.lights) and any(len(scene.bodies) > 1 or not body.mesh.diagnosis.convex for body in dense)
 

@@ -143,7 +143,7 @@ class Crossing:
 
 
 def measurable(scene: Scene) -> bool:
-    """True if a scene is small enough to be measured though nobody requests it."""
+    """True if a scene is small enough to be measured automatically."""
     return sum(len(item.mesh.faces) for item in scene.objects) <= MOST_TRIANGLES
 
 
