@@ -450,7 +450,7 @@ class PathRefinement:
         return True
 
     def stop(self) -> bool:
-        """End it; returns whether its picture was on show."""
+        """End the refinement; returns whether its picture was visible."""
         was = self._held is not None and self._held.paths > 0
         if self._held is not None:
             self._held.release()
@@ -608,7 +608,7 @@ class PhotonRefinement:
         self.note = f"caustics: {count}" if self.done else f"caustics: {count}; {self.light.photons:,} so far"
 
     def stop(self, viewport: Viewport) -> bool:
-        """End it; returns whether its picture was on show."""
+        """End the refinement; returns whether its picture was visible."""
         was = self._on_show
         if self.light is not None:
             self.light.release()

@@ -273,7 +273,7 @@ class PhotonStreams:
         self._step = ComputeVariants(gl, "transport/photon_streams.comp", **units, **images)
 
     def programs(self, scene: Scene, switches: Mapping[str, bool | int]) -> tuple[moderngl.ComputeShader, ...]:
-        """Compute shaders of a scene: for new photons, for hits of one object, and for hits where objects may overlap."""
+        """Compute shaders of a scene: for new photons, for hits of one object, and where objects may overlap."""
         alone = {**switches, "ONE_SURFACE": True}
         programs = [self._step.program(**alone, BEGINS=begins) for begins in (True, False)]
         if _shared_bounds(scene) is not None:
