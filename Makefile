@@ -36,7 +36,7 @@ test: ## run the tests, in two processes
 	@$(BIN)/python tools/build_web.py --if-npm
 	OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= \
 	GLIBC_TUNABLES=glibc.malloc.mmap_threshold=33554432:glibc.malloc.trim_threshold=268435456 \
-	LP_NUM_THREADS=0 $(BIN)/python -m pytest -n 2 --dist worksteal $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -n 2 --dist worksteal $(PYTEST_ARGS)
 
 test-drivers: ## run the tests of rendering on every OpenGL driver that is here: it takes long, see docs/drivers.md
 	$(BOOTSTRAP) --group test
