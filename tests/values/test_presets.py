@@ -46,7 +46,7 @@ COLORS = {
     "ice": ((0.86, 0.95, 0.985), 0.1),
     "paraffin": ((0.965, 0.925, 0.84), 0.01),
     "resin": ((0.95, 0.90, 0.74), 0.03),
-    "beeswax": ((0.988, 0.942, 0.577), 0.001),
+    "beeswax": ((0.95, 0.78, 0.10), 0.01),
 }
 
 #: Reduced scattering per mm of those that scatter, and the roughness of their surfaces.
@@ -55,7 +55,7 @@ SCATTERING = {
     "wax": ((0.5, 0.5, 0.5), 0.35),
     "soap": ((1.0, 1.0, 1.0), 0.3),
     "paraffin": ((1.2, 1.2, 1.2), 0.35),
-    "beeswax": ((1.2, 1.2, 1.2), 0.3),
+    "beeswax": ((0.5, 0.5, 0.5), 0.3),
 }
 
 #: Roughness of clear ones whose surfaces are not polished.
