@@ -447,7 +447,7 @@ def _numbers(text: str) -> tuple[int, ...]:
 def _import_embreex() -> None:
     if refusal := embree_refusal():
         raise RenderError(
-            "rays were to be traced on the CPU",
+            "ray tracing on the CPU",
             refusal,
             "pip install -U embreex, or render with OpenGL (`translucent doctor` says how)",
         )

@@ -135,8 +135,8 @@ def layer_effects(scene: Scene, *, interfaces: bool) -> list[Note]:
     effects = []
     if layers := object_names(item for item in scene.bodies if item.covers):
         text = (
-            f"{layers}: these layers cast no shadows, are invisible to refracted rays, are dimmed by all media on a "
-            "ray behind its first body, and are sorted by object, even where they intersect"
+            f"{layers}: these layers cast no shadows, are invisible to refracted rays, are sorted by object even "
+            "where they intersect, and behind the first body of a ray are dimmed by all media of the ray"
             if interfaces
             else f"{layers}: these layers reflect only diffusely"
         )
