@@ -14,7 +14,7 @@ import translucent as tl
 from tests.command_line import Run, one_error_line
 from translucent.bake import lithophane as module
 from translucent.formulas.color import srgb_to_linear
-from translucent.media.filament import medium_of_td
+from translucent.media.conversion import extinction_of_td
 
 THIN, THICK, TD = 0.0006, 0.003, 0.004
 
@@ -27,7 +27,7 @@ def same_renderer(monkeypatch: pytest.MonkeyPatch, renderer: tl.Renderer) -> Non
 def test_the_thickness_is_what_the_tone_mapping_asks_for() -> None:
     picture = np.zeros((20, 30, 3))
     picture[:, 10:20], picture[:10, 20:] = 0.25, 1.0  # black, gray, and white over black
-    made = tl.lithophane(picture, medium_of_td(TD), (THIN, THICK), 0.029, 0.001)
+    made = tl.lithophane(picture, tl.Medium(absorption=extinction_of_td(TD)), (THIN, THICK), 0.029, 0.001)
     assert made.thickness.shape == (20, 30)
     assert made.thickness[15, [0, 29]] == pytest.approx(THICK, rel=1e-6)
     assert made.thickness[5, 29] == pytest.approx(THIN, rel=1e-6)
@@ -43,7 +43,7 @@ def test_the_relief_is_closed_and_shows_the_picture() -> None:
     y, x = np.mgrid[0:40, 0:60] / 60
     smooth = np.repeat((0.5 + 0.4 * np.sin(9 * x) * np.cos(7 * y))[..., None], 3, axis=-1)
     red = tl.Medium.from_color((0.8, 0.2, 0.1), 0.002)
-    for medium in (medium_of_td(TD), red):
+    for medium in (tl.Medium(absorption=extinction_of_td(TD)), red):
         made = tl.lithophane(smooth, medium, (THIN, THICK), 0.06, 0.001)
         assert str(made.mesh.diagnosis) == "closed, 1 component"
         assert np.abs(made.shown @ (0.2126, 0.7152, 0.0722) - made.target).max() < 0.01

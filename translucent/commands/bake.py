@@ -649,7 +649,8 @@ def lithophane(picture: Path, given: LithophaneOptions, as_json: bool) -> None:
     of light after a --distance in it.
     """
     from translucent.bake.lithophane import check_lithophane_output, lithophane
-    from translucent.media.filament import medium_of_td
+    from translucent.media.conversion import extinction_of_td
+    from translucent.media.medium import Medium
     from translucent.units import parse_length
 
     output, td = given.output, given.td
@@ -665,7 +666,7 @@ def lithophane(picture: Path, given: LithophaneOptions, as_json: bool) -> None:
             "lithophane", found, "choose the material with --td, with --color and --distance, or with --preset"
         )
     if td is not None:
-        medium = medium_of_td(parse_length(td, "mm"))
+        medium = Medium(absorption=extinction_of_td(parse_length(td, "mm")))
     assert medium is not None
     picture_file = Path(f"{check_lithophane_output(output)}.check.png")
     refuse_overwriting(output, picture)

@@ -251,12 +251,13 @@ def _distance_hint(color: str) -> str:
 def _given_medium(given: ExtinctionOptions) -> Medium | None:
     """Medium of a filament, of a file, or of a preset, if one is named."""
     from translucent.materials import load_medium
-    from translucent.media.filament import TD_TRANSMITTANCE, medium_of_td
+    from translucent.media.conversion import TD_TRANSMITTANCE, extinction_of_td
+    from translucent.media.medium import Medium
     from translucent.units import parse_length
 
     if given.td is not None:
         left = TD_TRANSMITTANCE if given.td_transmittance is None else given.td_transmittance
-        return medium_of_td(parse_length(given.td, given.unit), left)
+        return Medium(absorption=extinction_of_td(parse_length(given.td, given.unit), left))
     return MediumOptions(preset=given.preset).read() if given.source is None else load_medium(given.source, given.unit)
 
 
@@ -391,7 +392,7 @@ def _fitted_to_photographs(given: ExtinctionOptions) -> tuple[Medium, float, dic
 
 def _echo(reported: dict[str, Any], medium: Medium, stated: float, given: ExtinctionOptions, as_json: bool) -> None:
     """Print the facts about a medium, or its material for an engine, with its color stated at a distance."""
-    from translucent.media.filament import TD_TRANSMITTANCE, td_of
+    from translucent.media.conversion import TD_TRANSMITTANCE, td_of
 
     left = TD_TRANSMITTANCE if given.td_transmittance is None else given.td_transmittance
     td = td_of(medium.extinction, left)
