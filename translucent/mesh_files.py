@@ -214,7 +214,7 @@ def _require_archive_room(stream: BinaryIO, asked: str) -> None:
 
 
 def _require_free(stream: BinaryIO, kind: str, asked: str) -> None:
-    """Raise `InputError` where a mesh takes more memory than is free, by what the header of its file says."""
+    """Raise `InputError` if a mesh needs more memory than is free, estimated from the header of its file."""
     size = os.fstat(stream.fileno()).st_size
     found, needed = f"{size_text(size)} of text", _PER_BYTE * size
     head = stream.read(_HEADER)

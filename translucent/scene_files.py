@@ -405,7 +405,7 @@ def _composed(loaded: list[_LoadedModel], size: tuple[int, int], more: dict[str,
 
 
 class _SceneFile:
-    """Reader of a .toml file, which names the line of what is wrong."""
+    """Reader of a .toml scene file, whose errors name the line."""
 
     def __init__(
         self,

@@ -120,7 +120,7 @@ def tiles_requested(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> Iterator[Tile]:
-    """Render what is requested of a scene tile by tile; see `render_tiles`."""
+    """Render a request tile by tile; see `render_tiles`."""
     width, height = check_size(size)
     across, down = check_size(tile)
     windows = [(x, y) for y in range(0, height, down) for x in range(0, width, across)]
@@ -224,7 +224,7 @@ def _rendered(
     request: RenderRequest,
     progress: Callable[[float], None] | None,
 ) -> Frame:
-    """The frame of a tile, rendered with what is around it if need be."""
+    """Frame of a tile, rendered with a margin if necessary."""
     plan = renderer.plan_requested(scene, request)
     check_tiles(plan)
     margin = MARGIN if plan.has(PassName.TRACED, PassName.SURFACES) and plan.has(PassName.OPAQUE) else 0

@@ -1,4 +1,4 @@
-"""Lengths with units, and sizes of models: what one was taken to be, what it likely is, and the scale for another.
+"""Lengths with units, and sizes of models: assumed and likely units, and factors between them.
 
 Inside the toolkit every length is in metres; files and the command line take a unit.
 """
@@ -73,7 +73,7 @@ def parse_length(text: str, default_unit: str = "m") -> float:
 
 
 def metres_in(text: str) -> float | None:
-    """Metres of a length with a unit; None of a text that is none."""
+    """Metres of a length with a unit; None for other texts."""
     match = _LENGTH.fullmatch(text)
     if match is None or match[2].replace("µ", "u") not in METRES_PER_UNIT:
         return None

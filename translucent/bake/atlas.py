@@ -232,7 +232,7 @@ class Atlas:
         return np.concatenate(faces), np.concatenate(rows)
 
     def _spans(self, face: Integers, row: Integers) -> tuple[Integers, Integers]:
-        """First and last column + 1 in which faces (n,) touch rows (n,): the span of what the row cuts out of them."""
+        """First and last column + 1 in which faces (n,) overlap rows (n,)."""
         place = np.take(self._place, face, axis=2)
         low, high = np.full(len(face), np.inf), np.full(len(face), -np.inf)
         for i in range(3):

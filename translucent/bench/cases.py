@@ -455,7 +455,7 @@ def _without_interface(item: Object) -> Object:
 
 
 def effect_of(scene: Scene) -> Effect:
-    """Effect of the media of a scene, which decides what is worth measuring."""
+    """Effect of the media of a scene, such as absorption or scattering, which selects the contenders."""
     media = [body.medium for body in scene.bodies if body.medium is not None]
     if any(body.density is not None for body in scene.bodies):
         return "density"

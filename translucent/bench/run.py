@@ -76,7 +76,7 @@ def experiments(quick: bool, extra: Sequence[Case] = (), methods: Sequence[str] 
 
 @dataclass(frozen=True)
 class ReportRequest:
-    """What a report is to measure: scenes, methods and parts, and with how much effort.
+    """Request for a report: scenes, methods and parts to measure, and the effort.
 
     Attributes
     ----------

@@ -542,7 +542,7 @@ def halve(bench: BenchContext, scene: Scene, size: int) -> None:
 
 
 def map_times(bench: BenchContext, scene: Scene, size: int, seconds: float) -> Samples:
-    """Times of making one map, with all that this takes, beside those of its depth-only floor."""
+    """Times of rendering one shadow map, and of its depth-only floor."""
     failed: list[Exception] = []
     with _map_and_floor(bench, scene, size) as (draw_map, draw_depth):
         found = interleaved(draw_depth, {"map": draw_map}, seconds, lambda _, error: failed.append(error))

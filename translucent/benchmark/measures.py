@@ -1,4 +1,4 @@
-"""Measures of a picture against the truth of its scene, and signs that the picture is not what it should be."""
+"""Errors of a picture against the truth of its scene, and signs of typical mistakes in the picture."""
 
 from __future__ import annotations
 

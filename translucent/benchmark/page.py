@@ -97,7 +97,7 @@ class PageRow:
 
     @property
     def nrmse(self) -> float:
-        """Its error; infinite where it has thickness alone."""
+        """Error of the picture; infinite if the renderer computes only thickness."""
         found = math.nan if self.result.score is None else self.result.score.nrmse
         return found if math.isfinite(found) else math.inf
 

@@ -473,7 +473,7 @@ NOT_PROMISED = {"caustic": "its plan leaves out light of the environment that th
 
 
 def promise_kept(scene: BenchmarkScene, block: float) -> str:
-    """Sentence on what is promised for a scene, and whether an error of 4 x 4 pixels is within it."""
+    """Sentence on the promised error of a scene, and whether an error of 4 x 4 pixels keeps the promise."""
     if why := NOT_PROMISED.get(scene.name):
         return f"Nothing is promised: {why}. Measured: {block:.1%}."
     promised = PROMISED[scene.group]

@@ -26,7 +26,7 @@ TERMINAL, FILE = (1.0, 0.5), (10.0, 30.0)
 
 
 def echo(text: str, *, err: bool = False, nl: bool = True, color: bool | None = None) -> None:
-    """Print text; what is not printable in it is escaped, but for line ends, tabs and swatches.
+    """Print text with unprintable characters escaped, except line ends, tabs and swatches.
 
     Once nobody reads any more, as ``head`` does not after its lines, nothing is printed: that is no failure.
 
@@ -57,7 +57,7 @@ def advise(text: str) -> None:
 
 
 def _discard(stream: TextIO) -> None:
-    """Discard what a stream holds and all that is written to it."""
+    """Discard the buffer of a stream, and all later output."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)

@@ -406,7 +406,7 @@ class ExactRayCaster(SceneRayCaster):
         self._bodies = objects
 
     def nearest_exactly(self, origins: Array, directions: Array) -> tuple[Integers, Array]:
-        """As `nearest`, for few rays: in float64, with exact decisions on edges and vertices."""
+        """Nearest hits of a few rays in float64, with exact decisions on edges and vertices; see `nearest`."""
         face, distance = np.full((len(origins), self.groups), -1), np.full((len(origins), self.groups), np.inf)
         lines = Lines(origins, directions, np.full(len(origins), NEAREST), np.full(len(origins), np.inf))
         for (group, first), traced in zip(self.places(), self._traced, strict=True):

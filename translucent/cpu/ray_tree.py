@@ -516,7 +516,7 @@ class _Growth:
             self._add(own, found.coated[coated, None] * mirrored)
 
     def _both(self, branches: Branches, there: InteriorList, found: BranchInteractions) -> tuple[Branches, Branches]:
-        """Reflected and refracted branches at interfaces, those of sheets included; some carry no light."""
+        """Reflected and refracted branches at interfaces and sheets; some carry no light."""
         with np.errstate(under="ignore"):
             back, on = branches.throughput * found.reflectance, branches.throughput * found.passing
         reflected_directions = found.reflected.copy()

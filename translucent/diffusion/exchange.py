@@ -48,7 +48,7 @@ _BEFORE = 1e-5
 
 
 class OpaqueSurfaces:
-    """All opaque objects of a scene as one mesh in world coordinates, ready for rays, and what they reflect and emit.
+    """All opaque objects of a scene as one mesh for ray casting, with reflectance and emission.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ BodyHits = Callable[[Array, Array], tuple[Array, Integers]]
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Patches of opaque surfaces that the samples of a body see, and what they see themselves.
+    """Patches of opaque surfaces that are visible from the samples of a body, and their own visibility.
 
     Attributes
     ----------

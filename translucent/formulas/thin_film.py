@@ -67,7 +67,7 @@ def film_interference(optical_path: npt.ArrayLike) -> Array:
 def thin_film_reflectance(
     cos_incident: npt.ArrayLike, ior: npt.ArrayLike, film_ior: npt.ArrayLike, optical_thickness: npt.ArrayLike
 ) -> Array:
-    """Reflectance of a smooth interface under a thin film, unpolarized, 0..1; what is not reflected passes.
+    """Unpolarized reflectance (0..1) of a smooth interface under a thin film; the rest is transmitted.
 
     The same from both sides. With an index of the film that equals that of either side, or without thickness, it is
     `optics.fresnel_dielectric`. Where light could only tunnel through the film all is reflected.

@@ -229,7 +229,7 @@ def turntable(scene: Scene, count: int) -> Iterator[Scene]:
 
 
 def framed_all_around(scene: Scene, size: tuple[int, int]) -> Scene:
-    """Scene with its camera far enough away to see what is shown from every side of a `turntable`.
+    """Scene with its camera far enough away to show the whole model from every side of a `turntable`.
 
     An orthographic camera stays where it is.
     """

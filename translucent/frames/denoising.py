@@ -92,7 +92,7 @@ def denoised_radiance(radiance: Floats, scene: Scene, guide: Floats | None = Non
 
 
 def features(scene: Scene, size: tuple[int, int]) -> tuple[Floats, Floats]:
-    """Albedo and normals (h, w, 3) of what is seen through clear glass, means over the rays of each pixel."""
+    """Albedo and normals (h, w, 3) of the surfaces seen through clear glass, averaged over the rays of each pixel."""
     caster = SceneRayCaster(scene.objects)
     found = np.zeros((2, size[0] * size[1], 3))
     for right, down in sample_shifts(FEATURE_SAMPLES):
@@ -191,7 +191,7 @@ def _base_colors(body: Object, face: Integers, weights: Array) -> Array:
 
 
 def _is_clear(item: Object) -> bool:
-    """True if what is behind a body is seen through it."""
+    """True if a body is clear enough to see through."""
     if item.medium is None or item.covers:
         return False
     rough = item.surface is not None and (item.surface.roughness > CLEAR or item.surface.transmission < 1)

@@ -82,7 +82,7 @@ class Hierarchy:
 
 
 def build_hierarchy(low: Floats, high: Floats, leaf_size: int = LEAF_SIZE) -> Hierarchy:
-    """Build the hierarchy of boxes, such as those of triangles.
+    """Build a bounding volume hierarchy over boxes, such as the boxes of triangles.
 
     Parameters
     ----------

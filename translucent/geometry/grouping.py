@@ -55,7 +55,7 @@ class Groups:
 
 @dataclass(frozen=True)
 class SortedSides:
-    """Sides of faces, sorted by the edges that they lie on, and those of one edge by their numbers.
+    """Sides of faces, sorted by edge, and within an edge by number.
 
     Attributes
     ----------

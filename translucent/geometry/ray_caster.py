@@ -183,7 +183,7 @@ class PlacedMesh(Protocol):
 
     @property
     def mesh(self) -> Mesh:
-        """Its triangles."""
+        """Triangles of the ray caster."""
 
     @property
     def matrix(self) -> Array:

@@ -454,7 +454,7 @@ class Deformer:
         self._world: dict[int, Array] | None = None
 
     def skins(self, node: Json) -> bool:
-        """True if a skin moves the mesh of a node: its positions are then those of the world."""
+        """True if a skin moves the mesh of a node, so its positions are in world space."""
         return "skin" in node
 
     def moves(self, node: Json, primitive: Json) -> bool:

@@ -203,7 +203,7 @@ def _cache_folders() -> list[Path]:
 
 
 def _allocate_cache(folder: Path) -> None:
-    """Give the index of a cache all its blocks on the disk; where there is none yet, only try."""
+    """Allocate all disk blocks of a cache's index file; if the file is missing, only test whether this is possible."""
     if sys.platform == "linux":  # for checkers of types: other systems lack posix_fallocate
         indices = list(folder.glob("mesa_shader_cache*/index"))
         for index in indices:

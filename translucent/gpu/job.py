@@ -340,7 +340,7 @@ class FrameJob(CameraView):
         self._cleared.clear()
 
     def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
-        """Draw those of the objects that are in view with the current state."""
+        """Draw the objects that are in view, with the current state."""
         super().draw(program, tuple(i for i in objects if i in self._in_view))
 
     def light(self, lights: LightLookup) -> None:

@@ -276,7 +276,7 @@ class ShadowOccluders:
         self.middle = 0.5 * (self._low + self._high)
 
     def cameras(self) -> list[Camera]:
-        """Cameras of the light that see all but the grounds; what they do not see is lit."""
+        """Cameras of a light that cover all objects except grounds; points outside their view are lit."""
         if not self._throwing:
             return []
         radius = 0.5 * float(np.linalg.norm(self._high - self._low)) or self._scene.diagonal or 1.0

@@ -1,4 +1,4 @@
-"""Placement of objects in a frame, in float64: where they are, what they cover, and how their faces count."""
+"""Placement of objects in a frame, in float64: positions, covered pixels, and weights of their faces."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ class Part:
         return self.left, self.bottom, self.right - self.left, self.top - self.bottom
 
     def flipped(self, height: int) -> Part:
-        """The same part of a picture of this height whose first row is the top one."""
+        """This rectangle with its rows counted from the top of a picture of this height."""
         return Part(self.left, height - self.top, self.right, height - self.bottom)
 
     def rows(self, first: int, last: int) -> Part:

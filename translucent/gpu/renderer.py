@@ -133,7 +133,7 @@ def _compact_arrays(job: FrameJob) -> dict[str, Any]:
 
 
 def _fixed(values: Floats) -> Floats:
-    """The same values, read-only, as arrays of frames are made from them later."""
+    """Read-only copy of values, because arrays of frames are computed from them later."""
     values.setflags(write=False)
     return values
 

@@ -294,7 +294,7 @@ class ShadowAtlas:
         self.ground: GroundShadows | None = None
 
     def make(self, views: ShadowViews, *, spectral: bool, two_media: bool = False) -> None:
-        """Make room for maps; what the textures held is lost.
+        """Allocate textures for shadow maps; earlier contents are lost.
 
         Raises
         ------

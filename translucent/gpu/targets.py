@@ -116,7 +116,7 @@ class Storage:
         self._buffers: dict[str, moderngl.Buffer] = {}
 
     def get(self, name: str, size: int) -> moderngl.Buffer:
-        """A buffer of at least `size` bytes; what it held is lost where it has to grow.
+        """Buffer of at least `size` bytes; its contents are lost when it grows.
 
         Raises
         ------
@@ -180,7 +180,7 @@ class Targets:
         self.buffers = Storage(gl, f"frame size {size[0]}x{size[1]}")
 
     def __getitem__(self, name: str) -> moderngl.Framebuffer:
-        """The framebuffer of this name, as `FORMATS` says what it holds."""
+        """Framebuffer of this name in `FORMATS`."""
         return self._get(name)
 
     def path_and_count(self, spectral: bool, name: str = "accumulated") -> moderngl.Framebuffer:

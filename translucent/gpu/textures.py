@@ -1,4 +1,4 @@
-"""Textures of surfaces and environments, uploaded once and freed with what they are of."""
+"""Textures of surfaces and environments, uploaded once, and freed together with their images."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def unlike_powers(side: int) -> int:
 
 
 def kind_of(texture: Texture) -> int:
-    """Number of the kind of a texture: drivers compile other code for those of another kind.
+    """Number of the sampler type of a texture, because drivers compile other code for each type.
 
     Of sides that are powers of two or 1, and of what repeats (llvmpipe's ``lp_static_texture_state``).
     """

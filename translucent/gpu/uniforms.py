@@ -75,7 +75,7 @@ class BodyRoles:
 
 
 def body_records(placed: PlacedScene, roles: BodyRoles, center: Array) -> npt.NDArray[Any]:
-    """(objects,): contents of the Body blocks, but for what the view changes: `clip_rows`.
+    """(objects,): contents of the Body blocks, except `clip_rows`, which depend on the view.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def clip_rows(placed: PlacedScene, view: SampleView) -> Array:
 
 
 def _normal_matrices(placed: PlacedScene) -> Array:
-    """(objects, 4, 4): from normals of meshes to those of the world."""
+    """(objects, 4, 4): matrices that transform normals of meshes to the world."""
     inverted = np.array([item.mesh.diagnosis.inverted for item in placed.scene.objects])
     matrices = np.tile(np.eye(4), (len(inverted), 1, 1))
     # The inverse transpose keeps outwards outwards under a mirror; only an inverted mesh has its normals inside.

@@ -288,7 +288,7 @@ class Viewport:
                 side.step = 0
 
     def swap(self) -> None:
-        """Swap the sides: what the second has been drawn for takes the place of the first."""
+        """Swap the two sides of the viewport."""
         self._sides.reverse()
 
     def mean_radiance(self) -> float:

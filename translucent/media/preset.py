@@ -318,7 +318,7 @@ def read_presets(text: str, file: str = "presets.toml") -> dict[str, Preset]:
 
 
 def read_good_presets(text: str, file: str) -> tuple[dict[str, Preset], list[InputError]]:
-    """Presets of a TOML text that can be read, and what is wrong with the others, each with its line."""
+    """Readable presets of a TOML text, and the errors of the others, each with its line."""
     found: dict[str, Preset] = {}
     wrong = []
     try:

@@ -1,4 +1,4 @@
-"""The library of named media, those of the toolkit and files of the user's own; and tables of colors at distances."""
+"""Library of named media, built-in and user presets; and tables of colors at distances."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def presets_folder() -> Path:
 
 
 def read_own_presets(folder: Path | None = None) -> tuple[dict[str, Preset], list[InputError]]:
-    """Presets in the .toml files of a folder, by name, and what is wrong with others: with its file and line.
+    """Presets in the .toml files of a folder, by name, and errors of unreadable ones, with file and line.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def preset_name(words: str) -> str:
 
 
 def save_own_preset(one: Preset, folder: Path | None = None) -> Path:
-    """Write a preset into a file of its name; one that is there is replaced.
+    """Write a preset into a file with its name; an existing file is replaced.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def presets() -> dict[str, Preset]:
 
 
 def grouped(found: Mapping[str, Preset]) -> dict[str, list[Preset]]:
-    """Presets by their groups, those of the toolkit first; what has no group is among the user's own."""
+    """Presets by group, built-in ones first; user presets without a group are in the group `OWN`."""
     order = dict.fromkeys(one.group for one in _all().values())
     groups: dict[str, list[Preset]] = {group: [] for group in sorted(order)}
     for one in found.values():

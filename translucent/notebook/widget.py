@@ -1,4 +1,4 @@
-"""Widget of a scene: what the browser knows of media and camera, and the traits that Python sees of it.
+"""Notebook widget of a scene: its state in the browser, and the traits of its material and camera.
 
 Two traits go to the browser and come back: ``_media``, a dict of extinction, ior, roughness and distance for each
 medium, and ``_camera``. All others are views of these, so that a change means the same whichever side it comes from;

@@ -274,7 +274,7 @@ def _medium_entry(planned: PagePlan, medium: Medium) -> dict[str, Any]:
 
 
 def _preset_of(planned: PagePlan, body: Object) -> str:
-    """Name of the preset that a body was given; nothing if its medium is of none."""
+    """Name of the preset of a body's medium; empty if there is none."""
     given = planned.given_body(body)
     roughness = 0.0 if given.surface is None else given.surface.roughness
     found = (name for name, one in presets().items() if (one.medium, one.roughness) == (given.medium, roughness))

@@ -170,12 +170,12 @@ class PagePlan:
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """Notes on what the page does not show, or not exactly."""
+        """Notes on effects that the page leaves out or approximates."""
         return (*self.own_notes, *self.plan.limits, *self.plan.unmodelled, *self.plan.remarks)
 
     @property
     def own_notes(self) -> tuple[Note, ...]:
-        """Notes on the page itself, beside those of the plan."""
+        """Notes on the page, in addition to those of the plan."""
         found = []
         if self.unlit:
             media = [body.medium for body in self.unlit if body.medium is not None]

@@ -1,4 +1,4 @@
-"""Notes of plans: where thickness is not exact, what is not rendered, and which bodies are black."""
+"""Notes of plans: inexact thickness, missing effects, and black bodies."""
 
 from __future__ import annotations
 

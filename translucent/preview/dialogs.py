@@ -1,4 +1,4 @@
-"""File dialogs: those of the system, or a browser of our own; and files dropped on the window."""
+"""File dialogs of the system, or the built-in file browser; and files dropped on the window."""
 
 from __future__ import annotations
 

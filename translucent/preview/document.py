@@ -579,7 +579,7 @@ def resized(orbit: Orbit, factor: float) -> Orbit:
 
 
 def zoomed(orbit: Orbit, factor: float, at: tuple[float, float] = (0.0, 0.0)) -> Orbit:
-    """Zoom by a factor; what is in the target's plane at `at` (heights right and down of the center) stays there."""
+    """Zoom by a factor around the point `at` of the target's plane (heights right and down of the center)."""
     distance = min(max(orbit.distance / factor, _NEAREST), _FARTHEST)
     camera = camera_of(orbit)
     shift = height_at_target(orbit) * (1.0 - distance / orbit.distance)

@@ -320,7 +320,7 @@ class WindowState:
         return self.work.do(SetLights(tuple(lights), None if step else self.drag))
 
     def snapshot(self, name: str, *, keep: bool) -> None:
-        """Keep what is on show as a snapshot, or show one again."""
+        """Store the document as a snapshot, or show a snapshot."""
         self.work.do(Keep(name) if keep else Recall(name))
 
     def compare_with(self, name: str) -> None:
@@ -481,7 +481,7 @@ class WindowState:
         self.change("look.light_pitch", min(max(self.get("look.light_pitch") + up, -89.0), 89.0))
 
     def escape(self) -> None:
-        """Close what is on top: the file browser, the page of keys, or let go of the selected object."""
+        """Close the topmost dialog, or clear the selection."""
         if self.browser is not None:
             self.browser = None
         elif self.keys_shown:

@@ -194,7 +194,7 @@ class _March:
         }
 
     def _all_terms(self) -> list[_Terms]:
-        """Terms of all marches: one for each point light, as equiangular steps are those of one light."""
+        """Terms of all marches: one per point light, because equiangular steps belong to one light."""
         lights = self.paths.lights if self.paths.volume.scatters else ()
         if self.scheme.method.quadrature != "equiangular":
             return [_Terms(True, lights)]

@@ -62,7 +62,7 @@ def lit_at_interface(
     rng: np.random.Generator,
     films: Films | None = None,
 ) -> tuple[Array, Mask, Array, Array]:
-    """As `scattered_at_interface`, with the weight (n, 3) of the light, which is 1 without films.
+    """Random directions like `scattered_at_interface`, with the weight (n, 3) of the light, which is 1 without films.
 
     And an estimate (lights, n, 3) in 1/sr of how much light is scattered to each of `to_lights`.
 

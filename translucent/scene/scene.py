@@ -430,14 +430,14 @@ class Scene(Frozen):
 
     @cached_property
     def shown_bounds(self) -> Array:
-        """(2, 3): smallest and largest world coordinates of what is shown."""
+        """(2, 3): smallest and largest world coordinates of the visible objects."""
         rendered = ~np.array([item.shadow_catcher for item in self.objects])
         boxes = self.boxes[rendered] if rendered.any() else self.boxes
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
     @cached_property
     def diagonal(self) -> float:
-        """Length of the diagonal of what is shown in metres: the scale of the scene, however large its ground is."""
+        """Diagonal of the visible objects in metres, which is the scale of the scene, whatever its ground."""
         return float(np.linalg.norm(self.shown_bounds[1] - self.shown_bounds[0]))
 
 

@@ -238,7 +238,7 @@ def with_pattern(scene: AnyScene, pattern: str, among: Sequence[Object] | None =
 
 
 def with_media(scene: AnyScene, change: Callable[[Medium], Medium], among: Sequence[Object] | None = None) -> AnyScene:
-    """Scene with all of its media changed, or with those of some objects."""
+    """Scene with changed media, of all objects or of some."""
     chosen = set(map(id, scene.objects if among is None else among))
     media = {id(item.medium): change(item.medium) for item in scene.objects if item.medium is not None}
     objects = [
@@ -273,8 +273,8 @@ def filled(
 
 
 def objects_named(scene: Scene, name: str) -> tuple[Object, ...]:
-    """Objects of a name: those whose mesh has it, or, where none has, the parts of one, as ``Cup`` of ``Cup[0]``, or
-    those of a file of that name, as ``goblet`` of ``goblet.ply``.
+    """Objects with this name: of the mesh, of the parts of a mesh (``Cup`` for ``Cup[0]``), or of its file (``goblet``
+    for ``goblet.ply``).
 
     Raises
     ------

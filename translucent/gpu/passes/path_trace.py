@@ -310,7 +310,7 @@ class PathTracePass:
         self.tracer = PathTracer(gl)
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
-        """Follow the paths of this sample, or where nothing else depends on it those of all samples at once.
+        """Trace the paths of this sample, or of all samples at once if no other pass depends on it.
 
         The picture of opaque objects that paths do not see whole is drawn for each sample.
         """

@@ -223,7 +223,7 @@ class _Room:
             buffer.bind_to_storage_buffer(STORAGE_BINDINGS[name])
 
     def put_ended(self, found: int) -> int:
-        """List those of the first rays, with a hit, that end on opaque objects; returns how many there are."""
+        """List the first rays with a hit that end on opaque objects; returns their number."""
         counts = np.frombuffer(self._end_counts.read(4 * max(found, 1)), np.uint32)[:found]
         at = np.flatnonzero(counts)
         numbers, words = self._numbers

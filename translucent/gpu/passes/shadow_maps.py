@@ -305,7 +305,7 @@ def _mapped_ground(job: FrameJob) -> Mirror | None:
 
 
 def _read(job: FrameJob, views: ShadowViews | None, first: int, step: int) -> list[ShadowView]:
-    """Maps that a frame reads: those of lights, and of directions whose light may fall on visible surfaces."""
+    """Shadow maps that a frame needs: of lights, and of directions whose light may reach visible surfaces."""
     if views is None:
         return []
     side = None if job.any_eye or job.features.shadows_backdrop else lit_side(job.scene)
@@ -471,7 +471,7 @@ def _frame(bounds: Array, ground: Mirror) -> tuple[Array, Array]:
 
 
 def _footprint(camera: Camera, radius: float, ground: Mirror, bounds: Array, axes: Array, side: int) -> Part:
-    """Texels of a map on which what a direction's camera sees has its shadow, with cells of that radius."""
+    """Texels of the ground map in the shadow of objects from one direction, with cells of this radius."""
     middle, _ = _frame(bounds, ground)
     half_width, half_height = camera.half_extent((1, 1))
     ends = np.stack([half_width * camera.right, half_height * camera.up])

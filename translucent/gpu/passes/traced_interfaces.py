@@ -280,7 +280,7 @@ def faintest_throughput(forks: int) -> float:
 
 
 def blurred_fraction(samples: int) -> float:
-    """Fraction of the variance of microfacets that blurs what they reflect; 1 with few samples.
+    """Fraction of the microfacet variance that blurs reflections; 1 with few samples.
 
     The blur is smooth and somewhat wrong, the samples are right and noisy: their errors balance about so. Where a
     denoiser follows, which takes out noise and keeps what is wrong, nothing is blurred.

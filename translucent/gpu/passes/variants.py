@@ -183,7 +183,7 @@ def look_switches(body: Object) -> dict[str, bool]:
 
 
 def background_switches(environment: Environment) -> dict[str, int]:
-    """Switches of shaders in which rays end at the environment: what it is, and whether the background lights."""
+    """Switches for rays that end in the environment: its type, and whether the background emits light."""
     picture, lights = environment.seen.kind == "image", environment.seen is environment
     return {
         "SEEN_MAP": picture + (picture and lights),

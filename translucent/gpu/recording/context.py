@@ -128,7 +128,7 @@ class RecordingContext:
         return RecordedProgram(vertex, fragment, CONSTANTS, merged)
 
     def vertex_array(self, program: RecordedProgram, content: Any, *_: Any, **__: Any) -> RecordedArray:
-        """Vertex array without vertices: those of meshes come from `RecordedMeshes`."""
+        """Vertex array without vertices; vertex arrays of meshes come from `RecordedMeshes`."""
         assert not content
         return RecordedArray(self, program, None, "fullscreen")
 

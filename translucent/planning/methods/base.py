@@ -123,7 +123,7 @@ def check_count(what: str, value: object, most: int, *, least: int = 1, example:
 
 
 def check_method(method: object) -> None:
-    """Raise `InputError` for what is no method; None leaves the choice to the planner."""
+    """Raise `InputError` for a value that is not a method; None leaves the choice to the planner."""
     if method is not None and not isinstance(method, Method):
         raise InputError(
             f"method {brief(method)}", "this is not a thickness method", "use a method such as tl.SignedDepth()"
