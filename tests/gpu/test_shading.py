@@ -261,7 +261,7 @@ def test_an_inverted_part_is_marked_invalid(renderer: tl.Renderer) -> None:
     assert mesh.diagnosis.inside_out_parts == 1
     scene = tl.Scene([tl.Object(mesh, medium=tl.Medium(absorption=1.0))], tl.Camera.look_at((0, 0.4, 4), (0, 0, 0)))
     assert not tl.plan(scene).exact
-    with pytest.warns(tl.TranslucentWarning, match="1 closed parts inside out"):
+    with pytest.warns(tl.TranslucentWarning, match="1 closed parts are inside out"):
         frame = renderer.render(scene, SIZE)
     inverted = Sphere((1.0, 0.0, 0.0), 0.4).chord(*scene.camera.rays(SIZE)) > 0.1
     assert not frame.valid[inverted].any()

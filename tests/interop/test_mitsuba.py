@@ -389,7 +389,7 @@ def on_a_ground() -> tl.Scene:
 @pytest.mark.parametrize(
     "make", [frosted, wax_before_a_lamp, fog_in_a_box, thin_plate, picture_behind_glass, on_a_ground]
 )
-@pytest.mark.filterwarnings("ignore:light of point, spot and directional lights:translucent.errors.TranslucentWarning")
+@pytest.mark.filterwarnings("ignore:caustics and refracted light of point:translucent.errors.TranslucentWarning")
 def test_pictures_agree(make: Callable[[], tl.Scene], renderer: tl.Renderer, tmp_path: Path) -> None:
     """Eight parts of the paths give the noise; 4 standard errors of the difference hold on 97 % of the pixels."""
     mi = pytest.importorskip("mitsuba", reason="the independent renderer is absent: pip install mitsuba")

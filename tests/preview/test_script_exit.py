@@ -26,7 +26,7 @@ def _wrong_preset(work: Workspace) -> None:
 
 def _lost_file(work: Workspace) -> None:
     def lose(_: Any) -> None:
-        raise RenderError("output 'a.png'", "it cannot be written (No space left on device)", "check the disk")
+        raise RenderError("output 'a.png'", "the output cannot be written (No space left on device)", "check the disk")
 
     work.lanes["write"].start("writing", lose, print)
     wait(work, lambda: work.failure is not None)

@@ -126,7 +126,7 @@ def test_a_film_that_ffmpeg_does_not_finish_replaces_nothing(
     output = tmp_path / "out" / "spin.mp4"
     output.parent.mkdir()
     output.write_text("the old one")
-    with pytest.raises(tl.RenderError, match=r"spin\.mp4'; it cannot be written") as caught:
+    with pytest.raises(tl.RenderError, match=r"spin\.mp4'; the file cannot be written") as caught:
         write_animation(output, frames())
     assert found in str(caught.value)
     assert output.read_text() == "the old one"

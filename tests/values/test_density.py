@@ -151,7 +151,10 @@ def test_files_that_are_none(tmp_path: Path) -> None:
         (lambda: tl.ExponentialDensity(0, 0.0, 1), "ExponentialDensity start 0.0; the density must be above 0"),
         (lambda: tl.ExponentialDensity(0, 1, math.inf), "ExponentialDensity end inf"),
         (lambda: tl.Object(MESH, density=tl.LinearDensity(0, 0, 1)), "the object is opaque"),
-        (lambda: tl.Object(MESH, tl.Medium(1.0), sheet_thickness=1e-3, density=tl.LinearDensity(0, 0, 1)), "a sheet"),
+        (
+            lambda: tl.Object(MESH, tl.Medium(1.0), sheet_thickness=1e-3, density=tl.LinearDensity(0, 0, 1)),
+            "a thin-walled sheet",
+        ),
         (lambda: tl.Object(MESH, tl.Medium(1.0), density=np.ones((2, 2, 2))), "(?s)density of an object .* ndarray"),  # type: ignore[arg-type]
     ],
 )

@@ -56,7 +56,7 @@ def test_every_entry_may_have_a_roughness(roughness: str) -> None:
     ("old", "new", "message"),
     [
         ("absorption", "absorbtion", "media.toml, [ink]; unknown key 'absorbtion'; did you mean 'absorption'?"),
-        ("note", "zzz", "media.toml, [ink]; unknown key 'zzz'; use some of absorption, aliases, "),
+        ("note", "zzz", "media.toml, [ink]; unknown key 'zzz'; use one of absorption, aliases, "),
         ('kind = "measured"\n', "", "media.toml, [ink]; the preset has no key 'kind'; add this key"),
         ('unit = "mm"\n', "", "media.toml, [ink]; the preset has no key 'unit'; add this key"),
         ("scattering = [0.5, 0.0, 0.5]\n", "", "media.toml, [ink]; the preset has no key 'scattering'; add this key"),

@@ -28,8 +28,8 @@ PICTURE = np.arange(24, dtype=np.float64).reshape(2, 4, 3) / 24
         ),  # nm
         ({"iridescence_ior": 0.9}, "surface iridescence_ior 0.9; the value must lie in 1 to 100"),
         ({"clearcoat": 1.5}, "surface clearcoat 1.5; the value must lie in 0 to 1"),
-        ({"color": (1, 2, 0)}, r"surface color \(1, 2, 0\); not three numbers in 0 to 1"),
-        ({"emissive": (-1, 0, 0)}, r"surface emissive \(-1, 0, 0\); not three numbers in 0 to 1e\+18"),
+        ({"color": (1, 2, 0)}, r"surface color \(1, 2, 0\); the value must be three numbers in 0 to 1"),
+        ({"emissive": (-1, 0, 0)}, r"surface emissive \(-1, 0, 0\); the value must be three numbers in 0 to 1e\+18"),
         ({"emissive": "glow"}, "'glow'"),
         (
             {"emissive_texture": PICTURE},
