@@ -72,15 +72,41 @@ vec3 inclusion_exitance(int object, vec3 point, vec3 color) {
     return color * irradiance / (PI * row.ior * row.ior);
 }
 
+// Environment in a direction, over what events ahead make of it by a depth of these.
+vec3 blurred_ahead(ObjectRow row, vec3 direction, vec3 depth) {
+    if (row.ahead_deepest == 0.0) { return environment_light(direction, IN_SCATTERED_ROUGHNESS); }
+    vec2 uv = equirectangular_uv(direction, 0.0);
+    vec3 size = vec3(textureSize(diffused_light, 0));
+    vec2 at = vec2(1.0 + AHEAD_WIDTH * fract(uv.x), clamp(AHEAD_HEIGHT * uv.y, 0.5, AHEAD_HEIGHT - 0.5));
+    vec3 level = sqrt(min(depth / row.ahead_deepest, vec3(1.0))) * (AHEAD_DEPTHS - 1.0) + 0.5 + row.ahead_layer;
+    return vec3(
+        textureLod(diffused_light, vec3(at, level.r) / size, 0.0).r,
+        textureLod(diffused_light, vec3(at, level.g) / size, 0.0).g,
+        textureLod(diffused_light, vec3(at, level.b) / size, 0.0).b
+    );
+}
+
 // Radiance that comes along a ray, in a direction inside, by light that is scattered ahead in an object, and which diffusion
-// takes for unscattered: of the optical depth on the ray the part by such events does not count. From the environment
-// behind, blurred, and as much as is mirrored where it leaves on the other side.
-vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) {
+// takes for unscattered: of the optical depth on the ray the part by such events does not count. From the environment behind,
+// blurred, where the ray leaves, and of what is mirrored there. normal: where it leaves; 0 where that is not known.
+vec3 ahead_in_scattered(int object, vec3 direction, vec3 normal, vec3 optical_depth) {
     ObjectRow row = object_table_row(object);
     vec3 in_scattered = transmittance((1.0 - row.ahead) * optical_depth) - transmittance(optical_depth);
     if (max(in_scattered.r, max(in_scattered.g, in_scattered.b)) <= 0.0) { return vec3(0.0); }
-    vec3 far = row.in_scattered_far * environment_light(direction, IN_SCATTERED_ROUGHNESS);
-    return in_scattered * (far + row.in_scattered_near * environment_light(-direction, IN_SCATTERED_ROUGHNESS));
+    float mirrored = row.in_scattered_mirrored;
+    vec3 leaving = direction;
+    if (normal != vec3(0.0)) {
+        vec3 facing = dot(direction, normal) < 0.0 ? normal : -normal;
+        mirrored = fresnel_dielectric(-dot(direction, facing), 1.0 / row.ior);
+        if (mirrored < 1.0) { leaving = refracted_direction(direction, facing, 1.0 / row.ior); }
+    }
+    vec3 found = vec3(0.0);
+    if (mirrored < 1.0) { found = (1.0 - mirrored) * blurred_ahead(row, leaving, row.ahead * optical_depth); }
+    if (mirrored > 0.0) {
+        vec3 far = row.in_scattered_far * environment_light(direction, IN_SCATTERED_ROUGHNESS);
+        found += mirrored * (far + row.in_scattered_near * environment_light(-direction, IN_SCATTERED_ROUGHNESS));
+    }
+    return in_scattered * found;
 }
 
 // The same of light of the lights, through a wall without an interface. normal: outwards where the ray begins inside.
@@ -102,6 +128,6 @@ vec3 ahead_from_lights(int object, vec3 far_end, vec3 normal, vec3 direction, ve
 #else
 vec3 ahead_from_lights(int object, vec3 far_end, vec3 normal, vec3 direction, vec3 optical_depth) { return vec3(0.0); }
 vec3 subsurface_exitance(int object, vec3 point, vec3 normal, vec3 direction, float cosine, vec3 optical_depth) { return vec3(0.0); }
-vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) { return vec3(0.0); }
+vec3 ahead_in_scattered(int object, vec3 direction, vec3 normal, vec3 optical_depth) { return vec3(0.0); }
 vec3 inclusion_exitance(int object, vec3 point, vec3 color) { return vec3(0.0); }
 #endif

@@ -163,7 +163,8 @@ bool is_layer(int body) {
 }
 
 // Adds what media emit and scatter towards the eye along a segment, and attenuates its ray; returns the transmittance.
-vec3 through_media(inout Ray ray, int effective, Hit hit) {
+// normal: where it ends; 0 where that is not known.
+vec3 through_media(inout Ray ray, int effective, Hit hit, vec3 normal) {
     if (ray.interior.x == 0u) { return vec3(1.0); }
     if (hit.object < 0) { lose(ray); }  // it has left through a hole
     Medium medium = medium_in(ray.interior, effective);
@@ -179,7 +180,7 @@ vec3 through_media(inout Ray ray, int effective, Hit hit) {
     if (effective != AIR) {
         float cosine = clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0);
         traced_radiance += ray.throughput * subsurface_exitance(effective, ray.origin, ray.outwards, ray.direction, cosine, medium.extinction * path);
-        traced_radiance += ray.throughput * ahead_in_scattered(effective, ray.direction, medium.extinction * path);
+        traced_radiance += ray.throughput * ahead_in_scattered(effective, ray.direction, normal, medium.extinction * path);
         vec3 far_end = ray.origin + hit.path * ray.direction;
         traced_radiance += ray.throughput * ahead_from_lights(effective, far_end, ray.outwards, ray.direction, medium.extinction * path);
     }
@@ -351,7 +352,7 @@ int follow_to_end(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, in
         ray.interior = uvec4(0u);
         before = AIR;
     }
-    vec3 passed = through_media(ray, before, hit);
+    vec3 passed = through_media(ray, before, hit, leaves ? vec3(0.0) : surface.smooth_normal);
     if (leaves) {
         escape(ray, escaped_ray(ray, AIR, vec3(0.0), ray.origin));
         return NONE;

@@ -33,6 +33,7 @@ from translucent.diffusion.entering import (
     opaque_surfaces,
     sky_light,
 )
+from translucent.diffusion.environment_ahead import behind_body
 from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.diffusion.first_events import EnteringRays, joined_rays
 from translucent.diffusion.grid import other_plane_points, plane_points
@@ -44,6 +45,7 @@ from translucent.geometry.solids import Box, Sphere
 from translucent.planning.plan import plan
 from translucent.planning.scattering import Diffusion
 from translucent.reference import slabs
+from translucent.scene.environment_map import row_solid_angles, texel_directions
 
 # What enters
 
@@ -317,11 +319,27 @@ def test_other_bodies_dim_lights_on_their_way_in(inside: bool) -> None:
 # Light that is scattered ahead
 
 
+def test_a_blurred_environment_has_the_moments_of_its_depth() -> None:
+    """Over those of order 0, which are as of order 1; order 2 decays as Goudsmit and Saunderson have it."""
+    directions, weights = texel_directions(32, 64), row_solid_angles(32, 64)[:, None]
+    bright = (directions[..., 1] > 0.9)[..., None] * np.array([8.0, 2.0, 1.0])
+    behind = behind_body(tl.Environment.image(bright + 0.1), tl.Medium(scattering=1.0, anisotropy=0.8), 1.0)
+    assert behind is not None
+    second = weights * (1.5 * directions[..., 1] ** 2 - 0.5)
+    own = np.einsum("yx,yxc->c", second, bright)
+    for depth in (0.5, 4.0):
+        found = behind.at(directions.reshape(-1, 3), np.full((32 * 64, 3), depth)).reshape(32, 64, 3)
+        total = (weights[..., None] * (bright + 0.1)).sum(axis=(0, 1))
+        np.testing.assert_allclose((weights[..., None] * found).sum(axis=(0, 1)), total, rtol=0.01)
+        ratio = (np.exp(-(1 - 0.8**2) * depth) - np.exp(-depth)) / (np.exp(-0.2 * depth) - np.exp(-depth))
+        np.testing.assert_allclose(np.einsum("yx,yxc->c", second, found), ratio * own, rtol=0.02)
+
+
 @pytest.mark.parametrize("passed", [1.0, 0.6, 0.0])
 def test_haze_is_mirrored_until_it_leaves(passed: float) -> None:
     """The closed form against its sum, mirror by mirror; nothing is lost where nothing is absorbed."""
     far, near = in_scattered_shares(0.6, passed)
-    inside, out = IN_SCATTERED_REFLECTED * 0.6, [1.0 - IN_SCATTERED_REFLECTED * 0.6, 0.0]
+    inside, out = 1.0, [0.0, 0.0]
     for bounce in range(1, 200):
         out[bounce % 2] += inside * passed * 0.4
         inside *= passed * 0.6

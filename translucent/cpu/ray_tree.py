@@ -32,7 +32,7 @@ from translucent.diffusion.field import DiffusionField
 from translucent.diffusion.interfaces import InterfaceTable
 from translucent.formulas import optics
 from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS, scattered_ahead
-from translucent.formulas.interface import reflected_direction
+from translucent.formulas.interface import reflected_direction, refracted_direction
 from translucent.geometry.ray_caster import dot, unit
 from translucent.reference.compositing import composite, emission_of_mixtures
 from translucent.reference.hits import Hits, Rays
@@ -127,10 +127,28 @@ class DiffusionFields:
         return np.asarray(np.isin(np.stack([before, after]), list(self._fields)).any(axis=0))
 
     def in_scattered(self, body: Integers) -> Array:
-        """(k, 3, 3): fraction of the extinction in bodies (k,) by forward scattering; of it, far and near exitance."""
+        """(k, 3, 3): fraction of the extinction in bodies (k,) by forward scattering; see `in_scattered_shares`."""
         found = np.zeros((len(body), 3, 3))
         for number, field in self._fields.items():
             found[body == number] = np.stack([field.ahead, *field.in_scattered])
+        return found
+
+    def ior(self, body: Integers) -> Array:
+        """(k,): indices of refraction of bodies (k,) in which light diffuses, 1 of others."""
+        found = np.ones(len(body))
+        for number, field in self._fields.items():
+            found[body == number] = field.ior
+        return found
+
+    def environment_behind(self, body: Integers, directions: Array, depth: Array, other: Array) -> Array:
+        """(k, 3): environment in directions (k, 3), as bodies (k,) blur it by scattering of depths (k, 3) ahead.
+
+        It is `other` (k, 3) for bodies that hold no picture of it.
+        """
+        found = other.copy()
+        for number, field in self._fields.items():
+            if field.behind is not None and (chosen := np.flatnonzero(body == number)).size:
+                found[chosen] = field.behind.at(directions[chosen], depth[chosen] / field.phase.mean_cosine)
         return found
 
     def anisotropy(self, body: Integers) -> Array:
@@ -332,7 +350,7 @@ class _Growth:
         self.found.valid[branches.owner[free][open_ended]] = False
         hit = np.flatnonzero(~free)
         face = np.where(distance[hit] <= place[hit, None] + TOGETHER, face[hit], -1)
-        branches = self._through_media(branches.where(hit), place[hit])
+        branches = self._through_media(branches.where(hit), place[hit], face)
         points = branches.origins + place[hit, None] * branches.directions
         footprint = moved_on(branches.footprint, place[hit])
         return self._at_surfaces(replace(branches, origins=points, last=face, footprint=footprint))
@@ -353,8 +371,8 @@ class _Growth:
     def _enters(self, face: Integers, directions: Array) -> Mask:
         return np.asarray(dot(self.caster.faces.outward[face], directions) < 0)
 
-    def _through_media(self, branches: Branches, length: Array) -> Branches:
-        """Attenuate branches over the distances (n,) to the next surface, in radii, and add what media emit."""
+    def _through_media(self, branches: Branches, length: Array, face: Integers) -> Branches:
+        """Attenuate branches over the distances (n,) in radii to the next faces (n, m), and add what media emit."""
         inside = np.flatnonzero(branches.interior[:, 0] != NOTHING)
         if not inside.size:
             return branches
@@ -363,16 +381,18 @@ class _Growth:
         if emitted is not None:
             self._add(own, emitted)
         if self.tree.diffused:
-            self._add_diffused(own, passed)
+            first = face[inside, (face[inside] >= 0).argmax(axis=1)]
+            self._add_diffused(own, passed, first, length[inside])
             self._add_ahead_from_lights(own, length[inside] * self.caster.radius, passed)
         throughput = branches.throughput.copy()
         with np.errstate(under="ignore"):
             throughput[inside] *= passed
         return replace(branches, throughput=throughput)
 
-    def _add_diffused(self, branches: Branches, passed: Array) -> None:
+    def _add_diffused(self, branches: Branches, passed: Array, face: Integers, length: Array) -> None:
         """Add subsurface light, and in-scattered light of forward scattering, which diffusion counts as unscattered."""
-        ahead, far, near = np.moveaxis(self.tree.diffused.in_scattered(self.media.effective(branches.interior)), 1, 0)
+        body = self.media.effective(branches.interior)
+        ahead, far, near = np.moveaxis(self.tree.diffused.in_scattered(body), 1, 0)
         with np.errstate(under="ignore"):
             self._add(branches, branches.diffused * (1.0 - passed ** (1.0 - ahead)))
         in_scattered = np.flatnonzero(ahead.any(axis=1))
@@ -383,14 +403,25 @@ class _Growth:
                 far[in_scattered],
                 near[in_scattered],
             )
+            body, face = body[in_scattered], face[in_scattered]
+            passed, length = passed[in_scattered], length[in_scattered]
             # Of the optical depth, which varies as the density does, the part by such events does not count.
             with np.errstate(under="ignore"):
-                through = passed[in_scattered] ** (1.0 - ahead)
+                through = passed ** (1.0 - ahead)
             behind, before = (
                 self.tree.surroundings.blurred(own, sign * own.directions, IN_SCATTERED_ROUGHNESS)
                 for sign in (1.0, -1.0)
             )
-            self._add(own, (through - passed[in_scattered]) * (far * behind + near * before))
+            points = own.origins + length[:, None] * own.directions
+            normals, _ = self.caster.facing_normals(face, points, own.directions)
+            ior = self.tree.diffused.ior(body)
+            mirrored = optics.fresnel_dielectric(-dot(own.directions, normals), 1.0 / ior)[:, None]
+            leaving = refracted_direction(own.directions, normals, 1.0 / ior)
+            leaving = np.where(mirrored < 1.0, leaving, own.directions)
+            blurred = self.tree.surroundings.blurred(own, leaving, IN_SCATTERED_ROUGHNESS)
+            depth = -np.log(np.maximum(passed, np.finfo(np.float64).tiny)) * ahead
+            seen = self.tree.diffused.environment_behind(body, leaving, depth, blurred)
+            self._add(own, (through - passed) * ((1.0 - mirrored) * seen + mirrored * (far * behind + near * before)))
 
     def _add_ahead_from_lights(self, branches: Branches, length: Array, passed: Array) -> None:
         """Add light of the lights that is scattered ahead in walls without an interface; length (n,) in metres."""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Lock
 
 import numpy as np
 
 from translucent.arrays import Array, Integers
 from translucent.diffusion.entering import bounding_ball, opaque_surfaces, radiance_without_suns
+from translucent.diffusion.environment_ahead import behind_body
 from translucent.diffusion.exchange import BodyHits, GroundMap, GroundPoints, OpaqueSurfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.diffusion.keys import (
@@ -113,7 +114,8 @@ class FieldCache:
                 body = scene.objects[i]
                 if treatment_of(body) is Treatment.DIFFUSION:
                     own = self._body(body, medium, places, opaque, diffusion)
-                    surfaces[i] = own.field(scene, i, bent.entering.get(i), bent.stops.get(i))
+                    field = own.field(scene, i, bent.entering.get(i), bent.stops.get(i))
+                    surfaces[i] = replace(field, behind=behind_body(scene.environment, medium, body.mean_thickness))
                     lit[i] = own.lit
                 else:
                     volumes[i] = self._volume(body, medium, diffusion).field(scene, bent.volumes.get(i))

@@ -22,6 +22,7 @@ from translucent.diffusion.entering import (
     sky_light,
     suns_of,
 )
+from translucent.diffusion.environment_ahead import EnvironmentAhead
 from translucent.diffusion.exchange import Patches, direct_irradiance
 from translucent.diffusion.first_events import EnteringRays, joined_rays
 from translucent.diffusion.grid import BodyGrid
@@ -33,6 +34,7 @@ from translucent.diffusion.solution import BodySystem, DiffuseSolution
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, exit_quadrature
 from translucent.formulas.diffusion import (
+    IN_SCATTERED_REFLECTED,
     LEAST_COSINE,
     UNIFORM_COSINE,
     emergent_radiance,
@@ -103,6 +105,10 @@ class DiffusionField:
         Fraction of its extinction by light that is scattered ahead, g sigma_s / sigma_t: unscattered light here.
     in_scattered : tuple of two (3,) float64
         See `in_scattered_shares`.
+    mirrored : float
+        Fraction of forward-scattered light that the interface mirrors, where it is not known which surface.
+    behind : EnvironmentAhead, optional
+        What forward scattering leaves of the environment, in the direction in which a ray leaves the body.
     """
 
     fluence: Volume
@@ -125,19 +131,23 @@ class DiffusionField:
     ior: float
     ahead: Array
     in_scattered: tuple[Array, Array]
+    mirrored: float = 0.0
+    behind: EnvironmentAhead | None = None
 
     @cached_property
     def volumes(self) -> tuple[Volume, ...]:
         """Arrays (2 x, 3 y, z, 3) that pictures look up: along paths on which all light is scattered.
 
         Sides are beside each other: outwards and inwards along each axis in two columns, the axes in three rows. Then
-        come `travel` and `inclusions`, if there are any.
+        come `travel`, `inclusions` and `behind`, if there are any.
         """
         with np.errstate(under="ignore"):
             sides = [_beside(self.fluence / self.scattered), _beside(self._scattered_entering)]
         if self.travel is not None:
             sides.append(_beside(self.travel))
-        return (*sides,) if self.inclusions is None else (*sides, self.inclusions)
+        if self.inclusions is not None:
+            sides.append(self.inclusions)
+        return (*sides,) if self.behind is None else (*sides, self.behind.radiance)
 
     def radiance(self, points: Array, normals: Array, cosine: Array) -> Array:
         """(k, 3): basic radiance L / n^2 below points of the surface, towards it: the mean over paths through the body.
@@ -390,4 +400,5 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
         in_scattered=in_scattered_shares(
             polished.reflected, optics.transmittance(np.asarray(medium.absorption) * chord)
         ),
+        mirrored=IN_SCATTERED_REFLECTED * float(polished.reflected),
     )

@@ -159,9 +159,9 @@ def scattered_ahead(
 
 
 def in_scattered_shares(reflected: npt.ArrayLike, passed: npt.ArrayLike) -> tuple[Array, Array]:
-    """Fractions of forward-scattered light that leave on the far side, and after internal reflection on the near side.
+    """Fractions of mirrored forward-scattered light that leave on the far side, and on the near side.
 
-    What the far interface mirrors, as diffuse light, crosses the body again, and again after each mirror, until it
+    What the far interface mirrors crosses, as diffuse light, the body again, and again after each mirror, until it
     leaves: of p that comes across (1 - r) / (1 - (r p)^2) in all on the near side, and r p times that on the far one.
 
     Parameters
@@ -172,6 +172,5 @@ def in_scattered_shares(reflected: npt.ArrayLike, passed: npt.ArrayLike) -> tupl
         p: fraction of diffuse light that absorption lets across the body.
     """
     r, p = np.asarray(reflected, np.float64), np.asarray(passed, np.float64)
-    first = IN_SCATTERED_REFLECTED * r
-    near = first * p * (1.0 - r) / (1.0 - (r * p) ** 2)
-    return np.asarray(1.0 - first + r * p * near), np.asarray(near)
+    near = p * (1.0 - r) / (1.0 - (r * p) ** 2)
+    return np.asarray(r * p * near), np.asarray(near)

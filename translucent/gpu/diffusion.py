@@ -89,6 +89,9 @@ class DiffusedTexture:
                 "exit_weights": field.exits[1],
                 "exit_share": field.exit_share,
                 "ahead": field.ahead,
+                "ahead_deepest": 0.0 if field.behind is None else field.behind.deepest * field.phase.mean_cosine,
+                "ahead_layer": self.first_layers[number] + sum(part.shape[2] for part in field.volumes[:-1]),
+                "in_scattered_mirrored": field.mirrored,
                 "in_scattered_far": field.in_scattered[0].astype(np.float32),
                 "in_scattered_near": field.in_scattered[1].astype(np.float32),
             }

@@ -423,8 +423,11 @@ OBJECT_ROW = PackedTable(
         ("exit_cosines", "f4", (3,)),  # see exit_quadrature
         ("exit_weights", "f4", (3,)),
         ("ahead", "f4", (3,)),  # fraction of its extinction by light that is scattered ahead
-        ("in_scattered_far", "f4", (3,)),  # fraction of that light which leaves where a ray does,
+        ("ahead_layer", "f4", ()),  # of what such events leave of the environment
+        ("in_scattered_far", "f4", (3,)),  # of that light, when mirrored: fraction that leaves where a ray does,
+        ("ahead_deepest", "f4", ()),  # depth of such events at the last layer; 0 for no layers
         ("in_scattered_near", "f4", (3,)),  # and on the other side
+        ("in_scattered_mirrored", "f4", ()),  # fraction that is mirrored, where the surface is not known
     ),
 )
 

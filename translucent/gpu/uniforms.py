@@ -187,6 +187,9 @@ _NO_DIFFUSION: Fields = {
     "exit_weights": 0.0,
     "exit_share": 0.0,
     "ahead": 0.0,
+    "ahead_layer": 0.0,
+    "ahead_deepest": 0.0,
+    "in_scattered_mirrored": 0.0,
     "in_scattered_far": 0.0,
     "in_scattered_near": 0.0,
 }

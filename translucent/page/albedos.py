@@ -19,7 +19,6 @@ from scipy.ndimage import distance_transform_edt
 
 from translucent.arrays import Array
 from translucent.formulas.diffuse_interface import half_space_reflectance
-from translucent.formulas.diffusion import IN_SCATTERED_REFLECTED
 from translucent.media.medium import Medium
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.rendered import RenderedObject, Treatment, scatterer_of, treated, treatment_of
@@ -155,7 +154,6 @@ class AlbedoLight:
             "anisotropy": self.medium.anisotropy,
             "least": SOLVED[0],
             "reflectance": self.reflectance.tolist(),
-            "reflected_ahead": IN_SCATTERED_REFLECTED,
             "error": self.error,
             "solutions": len(SOLVED),
             "coarser": COARSER,

@@ -315,7 +315,7 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
             text += "; a body next to another body is up to 10 % too dark"
         ahead = [body.medium is not None and body.medium.anisotropy >= STRONGLY_AHEAD for body in bodies]
         if any(ahead) and scene.environment.kind == "image":
-            text += "; bright parts of the environment, scattered forward by the bodies, are up to 50 % too dark"
+            text += "; bright parts of the environment, scattered forward by the bodies, are up to 10 % wrong"
         if any(body.medium is not None and body.medium.emits for body in bodies):
             text += "; light that the bodies emit and scatter is up to 10 % too dark"
         if held := [item for item in scene.opaque if any(_may_hold(body, item) for body in bodies)]:

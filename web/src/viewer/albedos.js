@@ -95,12 +95,11 @@ export function changedLight(told, texels, [width, height], after, sections) {
   return found;
 }
 
-/** Fractions of light scattered ahead that leave where a ray does, and on the other side: see `in_scattered_shares`. */
-export function aheadShares(told, mirror, absorption, thickness) {
-  const first = told.reflected_ahead * mirror;
+/** Fractions of mirrored light scattered ahead that leave where a ray does, and on the other side: see `in_scattered_shares`. */
+export function aheadShares(mirror, absorption, thickness) {
   return absorption.map((sigma) => {
     const passed = Math.exp(-2 * sigma * thickness);
-    const near = (first * passed * (1 - mirror)) / (1 - (mirror * passed) ** 2);
-    return [1 - first + mirror * passed * near, near];
+    const near = (passed * (1 - mirror)) / (1 - (mirror * passed) ** 2);
+    return [mirror * passed * near, near];
   });
 }

@@ -162,7 +162,7 @@ export class Materials {
   #writeScattering(row, object, albedo) {
     const { albedos } = this.page;
     const { absorption, scattering, extinction } = mediumOf(albedos, albedo);
-    const shares = aheadShares(albedos, row.inner_mirror[0], absorption, albedos.objects[object]);
+    const shares = aheadShares(row.inner_mirror[0], absorption, albedos.objects[object]);
     row.albedo.set(albedo);
     row.ahead.set(scattering.map((sigma, c) => (Math.max(albedos.anisotropy, 0) * sigma) / extinction[c]));
     row.in_scattered_far.set(shares.map(([far]) => far));
