@@ -1,5 +1,5 @@
-// The first rays of a rectangle of pixels, each at a place of its own: those of a block of 4 x 2 pixels lie together, and those of
-// the channels of a pixel, which are three where indices differ. adaptive: only of pixels that need more samples.
+// The first rays of some pixels, in the order of these; those of the channels of a pixel lie together, which are three where indices
+// differ.
 
 #include <constants>
 
@@ -13,28 +13,23 @@ layout(local_size_x = COMPUTE_GROUP) in;
 #include "transport/first_ray.glsl"
 #include "transport/stored_rays.glsl"
 
+layout(std430, binding = FIRST_PIXELS_BINDING) readonly buffer FirstPixels { uint first_pixels[]; };
 layout(std430, binding = TRACED_LIGHT_BINDING) writeonly buffer TracedLight { vec4 traced_light[]; };
 uniform int summed_row;      // first row of the frame that is there
 
-uniform sampler2D unsettled;
-uniform ivec4 rectangle;    // first column and row, and how many there are
-uniform int places;         // of blocks, whole ones
+uniform int first_number, pixel_count;   // of the pixels: of the first, and of all
 
 void main() {
     int place = int(gl_GlobalInvocationID.x);
-    if (place >= places) { return; }
+    if (place >= pixel_count) { return; }
     read_bodies();
-    int block = place >> 3, columns = (rectangle.z + 3) / 4;
-    ivec2 within = ivec2(block % columns * 4 + (place & 3), block / columns * 2 + (place >> 2 & 1));
-    ivec2 here = rectangle.xy + within;
-    bool exists = all(lessThan(within, rectangle.zw));
-    if (exists) { traced_light[(here.y - summed_row) * int(frame_size.x) + here.x] = vec4(0.0); }
+    ivec2 here = pixel_of(first_pixels[first_number + place]);
+    traced_light[(here.y - summed_row) * int(frame_size.x) + here.x] = vec4(0.0);
     Ray ray;
     PrimaryHit primary;
     float reach, variance;
     vec3 reflectance;
-    bool is_traced = exists && first_ray(pixel_at(here), ray, primary, reach, variance, reflectance);
-    if (adaptive == 1) { is_traced = is_traced && texelFetch(unsettled, here, 0).r > 0.0; }
+    bool is_traced = first_ray(pixel_at(here), ray, primary, reach, variance, reflectance);
 #if DISPERSION
     for (int channel = 0; channel < 3; ++channel) {
         branch_pixels[3 * place + channel] = is_traced && (mirrored == 0 || channel == 1) ? packed_pixel(here, channel) : NO_RAY;

@@ -19,9 +19,9 @@ bool begin_in_mirror(Pixel pixel, out Ray ray, out vec3 reflectance) {
     if (blurred_fraction < 1.0) { facet = microfacet_normal(normal, direction, sqrt(1.0 - blurred_fraction) * alpha, microfacet_numbers(pixel.number, 0, 1u)); }
     vec3 reflected = reflected_direction(direction, facet);
     if (dot(reflected, normal) <= 0.0) { return false; }
-    ray = Ray(point + MIRROR_MARGIN * surface_reach * normal, 0.0, reflected, blurred_fraction * alpha * alpha, vec3(1.0),
-        packed_state(1, 0, true, MOST_INTERACTIONS), 1u, uvec4(0u), -normal, no_footprint());
     float step = (mirror_surface.y - 1.0) / (mirror_surface.y + 1.0);
     reflectance = layer_of(vec3(step * step), reflectance_entry(cosine, mirror_surface.x)).albedo;
+    ray = Ray(point + MIRROR_MARGIN * surface_reach * normal, 0.0, reflected, blurred_fraction * alpha * alpha, reflectance,
+        packed_state(1, 0, true, MOST_INTERACTIONS), 1u, uvec4(0u), -normal, no_footprint());
     return true;
 }

@@ -94,6 +94,9 @@ void main() {
         out_radiance = vec4(0.0, 0.0, 0.0, adaptive == 1 && !has_interface(pixel) ? 1.0 : 0.0);
         out_transmittance = vec4(0.0);
         if (!is_traced) { return; }
+#if !FROM_EYE
+        through = vec3(1.0);  // nothing is before the ground that has no interface
+#endif
     }
 #endif
     if (!is_traced) {
@@ -105,9 +108,9 @@ void main() {
 #if MIRROR
     if (mirrored == 1) {
         vec3 without = environment_radiance(ray.origin, ray.direction, true, ray.blur);
-        out_radiance = vec4(reflectance * through * (min(light, vec3(NOTHING)) - without), float(adaptive));
+        out_radiance = vec4(through * (min(light, vec3(NOTHING)) - reflectance * without), float(adaptive));
         float level = clamp(luminance(out_radiance.rgb), -1e15, 1e15);
-        out_transmittance = vec4(adaptive == 1 ? level * level : 0.0, 0.0, 0.0, -strength(reflectance) / 3.0 * min(traced_lost, 1.0));
+        out_transmittance = vec4(adaptive == 1 ? level * level : 0.0, 0.0, 0.0, -min(traced_lost, 1.0));
         return;
     }
 #endif

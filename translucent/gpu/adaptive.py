@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import moderngl
 import numpy as np
@@ -11,6 +11,9 @@ import numpy.typing as npt
 
 from translucent.formulas.sampling import sample_shifts, sobol_points
 from translucent.gpu.job import FrameJob
+from translucent.gpu.passes.caustics import ROUNDS, ROUNDS_FROM
+from translucent.gpu.passes.opaque import is_smooth
+from translucent.gpu.passes.ray_generations import pixel_words
 from translucent.gpu.passes.traced_interfaces import FEW_SAMPLES, interior_at_eye, mirrored_part
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.placement import Part
@@ -44,6 +47,7 @@ MUCH_LOST, MIRROR_LOST = 0.1, 0.005
 
 #: Passes of a sample whose results are there, or are not read, when rays are traced from its interfaces.
 _DONE = (PassName.BACKDROP, PassName.CAUSTICS)
+_OF_OPAQUE = (PassName.SHADOW_MAPS, PassName.OPAQUE, PassName.CAUSTICS)
 _NEEDED = (PassName.SHADOW_MAPS, PassName.OPAQUE, PassName.INTERFACES, PassName.TRACED)
 
 Run = Callable[[tuple[PassName, ...]], None]
@@ -62,7 +66,8 @@ class AdaptiveSampling:
     The first round finds for every sample which pixels show an interface, and sums up the light of all others:
     edges are as smooth as ever. The second traces rays; in each pixel, their mean replaces all of its
     samples that hit an interface. Rays that a ground mirrors add their mean to the other samples. Opaque objects are
-    visible through interfaces as the mean of all samples shows them.
+    visible through interfaces as the mean of all samples shows them; a ground alone, which is smooth, everywhere as the
+    mean of a few.
 
     Parameters
     ----------
@@ -85,14 +90,17 @@ class AdaptiveSampling:
         if job.mirror is not None:
             job.targets["mirrored"].clear()
         job.bent_apart = True
+        job.samples, shifts = samples, sample_shifts(samples).tolist()
         if job.features.has_opaque:
             job.targets["opaque_mean"].clear()
-        for number, shift in enumerate(sample_shifts(samples).tolist()):
-            job.sample, job.samples = number, samples
+            if samples >= ROUNDS_FROM and is_smooth(job):
+                self._hold_opaque(job, shifts, run_passes)
+        for number, shift in enumerate(shifts):
+            job.sample = number
             job.place(tuple(shift))
             run_passes(())
-            if job.features.has_opaque:
-                self._add_opaque(job)
+            if job.features.has_opaque and not job.holds_opaque:
+                self._add_opaque(job, samples)
             clock.outside()
         job.bending = True
         leave_out = _left_out(job, mirror=job.mirror is not None, needed=_NEEDED)
@@ -147,12 +155,27 @@ class AdaptiveSampling:
             if name == "unsettled" or job.mirror is not None:
                 job.targets[name].clear()
         job.targets["unsettled"].color_attachments[0].write(found.astype(np.float32).tobytes())
+        job.unsettled = {"unsettled": pixel_words(found), "mirror_unsettled": pixel_words(np.zeros_like(found))}
         return int(found.sum())
 
-    def _add_opaque(self, job: FrameJob) -> None:
+    def _hold_opaque(self, job: FrameJob, shifts: Sequence[tuple[float, float]], run_passes: Run) -> None:
+        """Draw the opaque objects in a few samples, whose mean all samples then show."""
+        job.few_opaque = True
+        others = tuple(step.name for step in job.plan.passes if step.name not in _OF_OPAQUE)
+        for job.sample in ROUNDS:
+            job.place(shifts[job.sample])
+            run_passes(others)
+            self._add_opaque(job, len(ROUNDS))
+        self._part.bind(sampled=job.targets["opaque_mean"].color_attachments[0])
+        job.targets.view("opaque", 1).use()
+        self._gl.enable_only(moderngl.NOTHING)
+        self._part.draw_fullscreen(self._part.program(HELD=True))
+        job.holds_opaque = True
+
+    def _add_opaque(self, job: FrameJob, samples: int) -> None:
         self._part.bind(sampled=job.targets["opaque"].color_attachments[1])
-        program = self._part.program()
-        set_uniform(program, "part", 1.0 / job.samples)
+        program = self._part.program(HELD=False)
+        set_uniform(program, "part", 1.0 / samples)
         job.targets["opaque_mean"].use()
         add_up(self._gl)
         self._part.draw_fullscreen(program)
@@ -178,6 +201,8 @@ class AdaptiveSampling:
         left = 0
         for (names, *_, part), uniforms in zip(marked, own, strict=True):
             left += self._mark(job, *names, part, {**uniforms, "wanted": self._wanted, "measures": 0})
+            if job.plan.hits == "embree":
+                job.unsettled[names[1]] = pixel_words(read_floats(job.targets[names[1]], 0, 1) > 0.0)
         return left
 
     def _mark(self, job: FrameJob, source: str, mask: str, part: Part, values: dict[str, float]) -> int:
@@ -289,7 +314,8 @@ def _left_out(job: FrameJob, *, mirror: bool, needed: tuple[PassName, ...]) -> t
     """Passes of a sample that tracing its rays does not need: from a ground's mirror image, too, or from interfaces."""
     features = job.features
     # Of what the ground mirrors, media without an interface may absorb some.
-    if job.plan.ordered or features.emits or features.scatters or not features.one_interface or mirror:
+    dims = mirror and any(not (body.has_interface or body.covers) for body in job.scene.bodies)
+    if job.plan.ordered or features.emits or features.scatters or not features.one_interface or dims:
         return _DONE
     return tuple(step.name for step in job.plan.passes if step.name not in needed)
 

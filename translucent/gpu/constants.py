@@ -75,6 +75,7 @@ STORAGE_BINDINGS = {
     "ray_ends": 8,
     "end_counts": 9,
     "ended_rays": 0,
+    "first_pixels": 8,
 }
 
 #: Invocations in a group of a compute shader.

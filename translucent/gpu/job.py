@@ -245,6 +245,12 @@ class FrameJob(CameraView):
         Rays are traced from interfaces apart from what else a sample shows.
     bending : bool
         Of a sample, that alone is drawn now.
+    unsettled : dict of str to (n,) uint32
+        Of a job that is bending: pixels that need more samples, by the name of their target.
+    few_opaque : bool
+        Opaque objects are shaded in a few samples, before all others, which show the mean of these.
+    holds_opaque : bool
+        That mean is there.
     any_eye : bool
         What is drawn is to fit all cameras.
     projected_depth : bool
@@ -256,6 +262,7 @@ class FrameJob(CameraView):
 
     corner: tuple[int, int] = (0, 0)
     for_map = path_only = two_media = projected_depth = bent_apart = bending = any_eye = False
+    few_opaque = holds_opaque = False
     photon_light: tuple[moderngl.Texture, int, tuple[int, int]] | None = None
 
     def __init__(
@@ -277,6 +284,7 @@ class FrameJob(CameraView):
         self.sample, self.samples = 0, 1
         self.paths_traced = 0
         self.averaged = False
+        self.unsettled: dict[str, npt.NDArray[np.uint32]] = {}
         self.report: Callable[[float], None] = lambda fraction: None
         self.features = FrameFeatures(plan)
         self.compact = compact and self.features.can_be_compact

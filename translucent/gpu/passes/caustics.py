@@ -84,22 +84,25 @@ class CausticsPass:
         if job.photon_light is not None:
             return self._add_known(job, *job.photon_light)
         rounds = _rounds(job.samples)
-        if job.sample not in rounds:
+        if job.sample not in rounds or job.holds_opaque:
             return None
         number = job.sample - rounds.start
         with ExitStack() as stack:
-            tracer = self.begin(stack, job)
+            tracer = self.begin(stack, job, again=job.few_opaque and number > 0)
             for i, aim in enumerate(tracer.aims):
                 begin, end = (aim.photons * (number + j) // len(rounds) for j in range(2))
                 self.follow(job, tracer, i, begin, end)
+        if job.few_opaque and number < len(rounds) - 1:
+            return None  # where the ground is smooth, the last of them shows all photons
         self.draw_base(job, spec.objects)
         return self.shade(job, job.targets.view("opaque", 1))
 
-    def begin(self, stack: ExitStack, job: FrameJob) -> PhotonTracer:
-        """Prepare photon tracing in the scene of a job, and clear landed photons."""
+    def begin(self, stack: ExitStack, job: FrameJob, *, again: bool = False) -> PhotonTracer:
+        """Prepare photon tracing in the scene of a job, and clear landed photons, unless more are added to them."""
         require_interfaces(job.gl.info)
         assert job.plan.caustics is not None
-        job.targets["photons"].clear()
+        if not again:
+            job.targets["photons"].clear()
         aims = photon_aims(job.scene, media_center(job.scene), job.plan.caustics.photons)
         return PhotonTracer(aims, self._landed(stack), *self._tracer(stack, job))
 
@@ -207,9 +210,8 @@ class CausticsPass:
         photons = job.targets["photons"].color_attachments[0]
         self._spread.bind(photon_irradiance=photons, opaque_axial_depth=depth, receiver_normal=normal)
         program = self._spread.program()
-        bending = [body for body in job.scene.bodies if body.has_interface]
-        rough = all(body.surface is not None and body.surface.roughness > 0 for body in bending)
-        set_uniform(program, "enough", (ENOUGH_OF_ROUGH if rough else ENOUGH) / len(_rounds(job.samples)))
+    def begin(self, stack: ExitStack, job: FrameJob, *, again: bool = False) -> PhotonTracer:
+        """Prepare photon tracing in the scene of a job, and clear landed photons, unless more are added to them."""
         job.targets["photon_spread"].use()
         self._gl.enable_only(moderngl.NOTHING)
         self._spread.draw_fullscreen(program)
@@ -250,7 +252,7 @@ def _aim_values(aim: PhotonAim, number: int, job: FrameJob) -> dict[str, Any]:
         "aim_middle": tuple(aim.middle),
         "aim_right": tuple(aim.right),
         "aim_up": tuple(aim.up),
-        "photon_power": tuple(aim.flux * (job.samples / aim.photons)),
+        "photon_power": tuple(aim.flux * ((len(ROUNDS) if job.few_opaque else job.samples) / aim.photons)),
         "light_interior": tuple(low | high << 16 for low, high in zip(entries[::2], entries[1::2], strict=True)),
     }
 

@@ -17,7 +17,9 @@ from translucent.media.colors import ColorLike
 from translucent.planning.passes import PassSpec
 from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS
 from translucent.scene.backdrop import Backdrop
+from translucent.scene.grounds import ground_from_above, ground_of
 from translucent.scene.surface import TEXTURE_FIELDS, Surface
+from translucent.scene.texture import Falloff
 
 _MAPS = (
     "light_irradiance",
@@ -48,7 +50,7 @@ class OpaquePass:
 
     def run(self, job: FrameJob, spec: PassSpec) -> None:
         """Draw the opaque objects with the depth test on."""
-        if job.bending or job.averaged:  # no picture of them is read
+        if job.bending or job.averaged or job.holds_opaque:  # their picture is not read, or is there
             ends = job.targets.opaque_ends()
             ends.clear(float(CONSTANTS["NOTHING"]), depth=1.0)
             self.draw_depth(job, spec.objects, ends)
@@ -117,6 +119,19 @@ class OpaquePass:
                 program = self._surfaced.program(SURFACE=1, **common, **look_switches(view.scene.objects[i]))
                 set_surface(view, program, surface, surface.alpha_cutoff)
             view.draw(program, (i,))
+
+
+def is_smooth(job: FrameJob) -> bool:
+    """True if all that is opaque is a ground whose color varies by light alone: few samples show it as well as many."""
+    ground, scene = ground_of(job.scene), job.scene
+    if ground is None or len(scene.opaque) > 1 or job.backdrop is not None:
+        return False
+    surface = ground.ground.surface
+    textures = () if surface is None else surface.textures
+    plain = surface is None or (not surface.alpha_cutoff and all(isinstance(one, Falloff | None) for one in textures))
+    # Without a map of them, each sample has shadows of other directions of the environment.
+    mapped = not scene.environment_shadows or ground_from_above(scene) is not None
+    return plain and mapped and ground.ground.mesh.colors is None
 
 
 def shadow_switches(used: bool, resources: Resources) -> dict[str, bool]:

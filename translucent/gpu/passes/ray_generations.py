@@ -8,6 +8,7 @@ depends on the order in which threads run. A frame is traced in portions, which 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias
 
 import moderngl
@@ -27,7 +28,7 @@ MOST_BYTES = 64 << 20
 
 #: Places for rays to each pixel of a portion. Live rays fill no more than half of them: about two rays of a pixel are
 #: alive at once, in bodies with many walls three.
-PLACES, MORE_PLACES = 3, 8
+PLACES, MORE_PLACES = 6, 8
 
 #: Rows of the lists of live rays and what they hit; bytes of these, of light, and of the lists of pixels and of ends,
 #: for each ray.
@@ -37,8 +38,8 @@ _LIVE_BYTES = 4 * _ROWS + 16 + 8 + 4 + 16
 #: What the pixel of a place without a ray is; and the bits of the others that are not the channel.
 _NO_RAY, _PIXEL = np.uint32(0xFFFFFFFF), np.uint32(0x3FFFFFFF)
 
-#: Column, row, width and height.
-Rectangle: TypeAlias = tuple[int, int, int, int]
+#: Columns and rows of pixels, in words: see `pixel_words`.
+Pixels: TypeAlias = npt.NDArray[np.uint32]
 
 #: Columns and rows of a block of pixels, whose rays are computed together.
 _BLOCK = 4, 2
@@ -52,14 +53,11 @@ class RayGenerations:
     gl : moderngl.Context
     samplers : sequence of str
         Names of the samplers of ``shaders/transport/ray_step.glsl``, each with its place for its texture unit.
-    free : int
-        Texture unit of the marks of unsettled pixels.
     """
 
-    def __init__(self, gl: moderngl.Context, samplers: Sequence[str], free: int) -> None:
+    def __init__(self, gl: moderngl.Context, samplers: Sequence[str]) -> None:
         units = {name: unit for unit, name in enumerate(samplers)}
-        self._unsettled = free
-        self._begin = ComputeVariants(gl, "transport/begin_rays.comp", **units, unsettled=free)
+        self._begin = ComputeVariants(gl, "transport/begin_rays.comp", **units)
         self._step = ComputeVariants(gl, "transport/step_rays.comp", **units)
         self._shade = ComputeVariants(gl, "transport/shade_ends.comp", **units)
         self._sum = ComputeVariants(gl, "transport/sum_ray_light.comp")
@@ -68,7 +66,7 @@ class RayGenerations:
         self,
         job: FrameJob,
         part: Part,
-        mask: str,
+        pixels: Pixels,
         switches: Mapping[str, bool | int],
         values: Mapping[str, Any],
     ) -> None:
@@ -79,11 +77,13 @@ class RayGenerations:
         job : FrameJob
         part : Part
             Of the frame, whose row 0 is the top one.
-        mask : str
-            Target with the pixels that need more samples, where a job is bending.
+        pixels : (n,) uint32
+            Pixels of the part, as `pixel_words` has them.
         switches, values
             Of the shaders, whose textures are bound.
         """
+        if not len(pixels):
+            return
         width = job.targets.size[0]
         programs = _Programs(
             self._begin.program(**switches),
@@ -93,30 +93,27 @@ class RayGenerations:
             self._sum.program(),
         )
         hierarchies = job.resources.hierarchies.of(job.scene, textured=job.features.textured)
-        room = _Room(job, part, switches, hierarchies.first_triangles)
+        room = _Room(job, pixels, switches, hierarchies.first_triangles)
         sizes = {"ray_words": room.words, "end_words": room.end_words, "columns": width}
         for program in filter(None, programs):
             set_used(program, {**values, **sizes})
-        if job.bending:
-            job.targets[mask].color_attachments[0].use(self._unsettled)
         hits = job.resources.ray_hits.of(job.scene, media_center(job.scene))
         light = job.targets.buffers.get("traced_light", 16 * width * part.scissor[3])
         light.bind_to_storage_buffer(STORAGE_BINDINGS["traced_light"])
         job.gl.memory_barrier()  # light that is drawn by now may not be read yet
-        waiting = room.rectangles(part)[::-1]
+        waiting = room.portions(len(pixels))[::-1]
         while waiting:
-            rectangle = waiting.pop()
-            if not self._trace_rectangle(rectangle, room, hits, programs):
-                waiting += _halves(rectangle)[::-1]
+            portion = waiting.pop()
+            if not self._trace_portion(portion, room, hits, programs):
+                waiting += _halves(portion)[::-1]
 
-    def _trace_rectangle(self, rectangle: Rectangle, room: _Room, hits: EmbreeHits, programs: _Programs) -> bool:
-        """Trace the rays of a rectangle; returns False if there is no room for them all."""
+    def _trace_portion(self, portion: range, room: _Room, hits: EmbreeHits, programs: _Programs) -> bool:
+        """Trace the rays of some of the pixels; returns False if there is no room for them all."""
         begin, step, leave, shade, sum_up = programs
-        places = _places(rectangle)
-        set_used(begin, {"rectangle": rectangle, "places": places})
-        room.bind_branches()
-        self._begin.run(begin, places)
-        filled = places * room.channels
+        set_used(begin, {"first_number": portion.start, "pixel_count": len(portion)})
+        room.bind_begin()
+        self._begin.run(begin, len(portion))
+        filled = len(portion) * room.channels
         while count := len((live := room.turn(filled)).places):
             if count > room.live:
                 return False
@@ -162,7 +159,7 @@ class _Room:
     def __init__(
         self,
         job: FrameJob,
-        part: Part,
+        pixels: Pixels,
         switches: Mapping[str, bool | int],
         first_triangles: npt.NDArray[np.int32],
     ) -> None:
@@ -170,9 +167,8 @@ class _Room:
         self.words = _words(switches)
         self.end_words = _end_words(switches)
         branch = 4 * (self.words + 7)
-        width, height = part.scissor[2:]
         most = MOST_BYTES // (2 * branch + (_LIVE_BYTES + 8 * self.end_words) // 2)
-        self.places = min(MORE_PLACES * self.channels * _places((0, 0, width, height)), most)
+        self.places = min(MORE_PLACES * self.channels * len(pixels), most)
         self.live = self.places // 2
         storage = job.resources.rays
         self._rays, self._branches = (
@@ -193,15 +189,20 @@ class _Room:
                 ("ended", 16),
             )
         )
+        self._pixels = storage.get("first_pixels", pixels.nbytes)
+        self._pixels.write(pixels)
         self._numbers = np.zeros(0, np.int32), np.zeros(0, np.int32)
         self._first_triangles = first_triangles
 
-    def rectangles(self, part: Part) -> list[Rectangle]:
-        """Rectangles of pixels: column, row, width and height, each with rays that there is room for at first."""
-        left, top, width, height = part.scissor
-        blocks = -(-width // _BLOCK[0])
-        rows = max(self.places // (PLACES * self.channels * 8 * blocks), 1) * _BLOCK[1]
-        return [(left, top + begin, width, min(rows, height - begin)) for begin in range(0, height, rows)]
+    def portions(self, count: int) -> list[range]:
+        """Numbers of so many pixels in portions, each with rays that there is room for at first."""
+        most = max(self.places // (PLACES * self.channels), 1)
+        return [range(begin, min(begin + most, count)) for begin in range(0, count, most)]
+
+    def bind_begin(self) -> None:
+        """Bind the buffers of the first rays."""
+        self.bind_branches()
+        self._pixels.bind_to_storage_buffer(STORAGE_BINDINGS["first_pixels"])
 
     def bind_branches(self) -> None:
         """Bind the buffers that rays are written to."""
@@ -283,17 +284,37 @@ def _end_words(switches: Mapping[str, bool | int]) -> int:
     return 16 + bool(switches["MICROFACETS"]) + 4 * bool(switches["TEXTURED"])
 
 
-def _places(rectangle: Rectangle) -> int:
-    """Number of pixels in the whole blocks of a rectangle."""
+def pixel_words(requested: npt.NDArray[np.bool_], left: int = 0, top: int = 0) -> Pixels:
+    """Words for the requested pixels, row 0 the top one: those of a block of 4 x 2 pixels follow each other.
+
+    Parameters
+    ----------
+    requested : (h, w) bool
+    left, top : int
+        Column and row of the first pixel in the frame.
+
+    Returns
+    -------
+    (n,) uint32
+        Column, and row times 2^15.
+    """
+    height, width = requested.shape
     columns, rows = _BLOCK
-    return -(-rectangle[2] // columns) * -(-rectangle[3] // rows) * columns * rows
+    blocks = np.zeros((-(-height // rows), rows, -(-width // columns), columns), bool)
+    np.copyto(blocks.reshape(blocks.shape[0] * rows, -1)[:height, :width], requested)
+    down, across, below, beside = np.nonzero(blocks.transpose(0, 2, 1, 3))
+    x, y = left + columns * across + beside, top + rows * down + below
+    return (x | y << 15).astype(np.uint32)
 
 
-def _halves(rectangle: Rectangle) -> list[Rectangle]:
-    """Two halves of a rectangle, its first rows or columns first."""
-    left, top, width, height = rectangle
-    if height > 1:
-        half = height // 2
-        return [(left, top, width, half), (left, top + half, width, height - half)]
-    half = width // 2
-    return [(left, top, half, height), (left + half, top, width - half, height)]
+@lru_cache(maxsize=4)
+def all_words(part: Part) -> Pixels:
+    """Words of all pixels of a part of a frame, whose row 0 is the top one."""
+    left, top, width, height = part.scissor
+    return pixel_words(np.ones((height, width), bool), left, top)
+
+
+def _halves(portion: range) -> list[range]:
+    """Two halves of a range of pixels."""
+    middle = (portion.start + portion.stop) // 2
+    return [range(portion.start, middle), range(middle, portion.stop)]

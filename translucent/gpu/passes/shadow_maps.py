@@ -70,8 +70,9 @@ _STEPS: dict[PassName, type[SignedDepthPass | ThinLayerPass | FragmentListsPass 
 #: Distance from its middle up to which a ground is not squeezed, in half diagonals of what stands on it.
 REACH = 1.5
 
-#: Largest side of a map, in texels. Half as wide as a light's map, its texels are as large as those of a direction's.
-MOST_TEXELS = 2048
+#: Largest side of a map, in texels. A quarter as wide as a light's map, its texels are twice as large as those of a
+#: direction's, whose light is blurred by the size of its cell.
+MOST_TEXELS = 1024
 
 #: Texels along a map for each pixel along a picture, whose longer side counts as the next power of two: a thumbnail
 #: takes a small map.
@@ -403,7 +404,7 @@ class GroundShadowsPass:
         cosines = {i: -float(ground.normal @ forward) for i, forward in ahead.items()}
         lit = [i for i, cosine in cosines.items() if cosine > 0.0]
         finest = TEXELS_OF_PIXEL * 2 ** int(max(job.targets.size) - 1).bit_length()
-        side = min(job.plan.shadows.size // 2, MOST_TEXELS, finest)
+        side = min(job.plan.shadows.size // 4, MOST_TEXELS, finest)
         target = self._sized(side)
         key = made_of, irradiance.tobytes(), tuple(lit), middle.tobytes(), axes.tobytes()
         if key != self._made_of:

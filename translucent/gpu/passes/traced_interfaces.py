@@ -15,7 +15,7 @@ from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.interfaces import NoInterface
 from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
-from translucent.gpu.passes.ray_generations import RayGenerations
+from translucent.gpu.passes.ray_generations import Pixels, RayGenerations, all_words
 from translucent.gpu.passes.variants import Variants, background_switches, coat_switches
 from translucent.gpu.placement import Part, extents, part_of
 from translucent.gpu.shaders import set_used
@@ -71,7 +71,7 @@ class TracedInterfacesPass:
         files = "geometry/fullscreen.vert", "transport/traced_interfaces.frag"
         self._variants = Variants(gl, *files, *_SAMPLERS)
         self._with_sums = Variants(gl, *files, *_SAMPLERS, version=SHADER_STORAGE)
-        self._generations = RayGenerations(gl, _RAY_SAMPLERS, len(_SAMPLERS))
+        self._generations = RayGenerations(gl, _RAY_SAMPLERS)
         self._no_interface = NoInterface(gl)
         self._where_unsettled = Variants(
             gl, "geometry/fullscreen.vert", "transport/where_unsettled.frag", "entered", "unsettled"
@@ -154,7 +154,7 @@ class TracedInterfacesPass:
         for row in range(part.bottom, part.top, max(rows, 1)):
             band, own = part.rows(row, row + rows), {**values, "summed_row": row}
             if by_generations:
-                self._generations.trace(job, band, mask, switches, own)
+                self._generations.trace(job, band, _pixels(job, band, mask), switches, own)
             program = variants.program(**switches, GENERATIONS=by_generations)
             set_used(program, own)
             variants.draw_part(band, program, framebuffer)
@@ -191,6 +191,16 @@ class TracedInterfacesPass:
         resources.shadows.use(self._variants.units)
         if resources.shadows.ground is not None:
             resources.shadows.ground.texture.use(self._variants.units["ground_shadows"])
+
+
+def _pixels(job: FrameJob, part: Part, mask: str) -> Pixels:
+    """Pixels of a part whose rays are traced: of a job that is bending, those in the target of the name `mask`."""
+    if not job.bending:
+        return all_words(part)
+    words = job.unsettled[mask]
+    columns, rows = words & 0x7FFF, words >> 15
+    within = (columns >= part.left) & (columns < part.right) & (rows >= part.bottom) & (rows < part.top)
+    return words[within]
 
 
 def _shows_more(job: FrameJob) -> bool:
