@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from functools import lru_cache
+from itertools import combinations
 
 import moderngl
 import numpy as np
@@ -24,12 +26,13 @@ from translucent.planning.passes import PassName
 Floats = npt.NDArray[np.float32]
 
 #: Of 16 samples: the largest range of light near a pixel that one sample is enough for, and the largest standard error
-#: that is as good as none, both as fractions of the light. With more samples they are smaller.
-CONTRAST, ERROR = 0.05, 0.005
+#: that is as good as none, both as fractions of the light. With more samples they are smaller. The error is a step of a
+#: picture with 8 bits in the middle of its range, by the slope of the curve of sRGB: (2.4 / (0.5 + 0.055)) / 255.
+CONTRAST, ERROR = 0.05, 0.017
 
 #: The same of the light that bodies add to what a ground mirrors, as a fraction of all light of the ground: that is
 #: smooth but for the mirror image, so that less of an error shows.
-MIRROR_CONTRAST = 0.01
+MIRROR_CONTRAST, MIRROR_ERROR = 0.01, 0.005
 
 #: Samples after which deviations are measured, and the most samples of a pixel, in those of the picture. Fewer of the
 #: picture are all taken.
@@ -39,6 +42,9 @@ FIRST_LOOK, MORE = 4, 2
 #: of the 24 around it, and from each of the eight by a fraction of that; and the least spread, as a fraction of the
 #: median. Isolated pixels have at most so many samples, in those of the picture.
 ISOLATED, ALONE, LEAST_SPREAD, MOST_AGAIN = 3.0, 0.4, 0.015, 8
+
+#: Samples from which those of the first look are chosen.
+_CHOICE = 32
 
 #: Fractions of a pixel's light that rays lose, as in open meshes, from which on it is not worth more samples: of
 #: interfaces, so that one sample of 16 makes the pixel invalid (`renderer.MOST_LOST`) whatever the others find; and of
@@ -184,14 +190,16 @@ class AdaptiveSampling:
         """Mark the pixels that need more samples than these; returns how many there are."""
         if not job.covered:
             return 0
-        marked = [(("bent", "unsettled"), CONTRAST, MUCH_LOST, Part(0, 0, *job.targets.size))]
+        marked = [(("bent", "unsettled"), CONTRAST, ERROR, MUCH_LOST, Part(0, 0, *job.targets.size))]
         if job.mirror is not None:
             part = mirrored_part(job, job.mirror)
-            marked.append((("mirrored", "mirror_unsettled"), MIRROR_CONTRAST, MIRROR_LOST, part))
+            marked.append((("mirrored", "mirror_unsettled"), MIRROR_CONTRAST, MIRROR_ERROR, MIRROR_LOST, part))
         finer = min(16.0 / samples, 1.0) ** 0.5
         values = {"samples": samples, "most": _most(samples), "first": taken == 1, "wanted": 0.0, "measures": 1}
-        values["error"] = finer * ERROR
-        own = [{**values, "contrast": finer * contrast, "much_lost": lost} for _, contrast, lost, _ in marked]
+        own = [
+            {**values, "contrast": finer * contrast, "error": finer * error, "much_lost": lost}
+            for _, contrast, error, lost, _ in marked
+        ]
         if taken == FIRST_LOOK:
             found = []
             for (names, *_, part), uniforms in zip(marked, own, strict=True):
@@ -297,14 +305,24 @@ def traced_samples(job: FrameJob) -> float:
     return float(taken[taken > 0].mean(dtype=np.float64)) if taken.any() else 0.0
 
 
+@lru_cache(maxsize=8)
 def _central_first(samples: int) -> list[tuple[float, float]]:
     """Sub-pixel shifts of the samples, the most central first: where surroundings are smooth, it is the only one.
 
-    Those of the pixels that take more follow, whose mean is in the middle, too.
+    The next three make with it four whose mean is nearest to that of all samples where light varies as a polynomial of
+    degree 2. Those of the pixels that take more follow, whose mean is in the middle, too.
     """
     shifts, more = sample_shifts(samples), sobol_points(_most(samples))[samples:]
     nearest = int(np.argmin(np.square(shifts).sum(axis=1)))
-    shifts[[0, nearest]] = shifts[[nearest, 0]]
+    order = [nearest, *(i for i in range(samples) if i != nearest)]
+    if samples > FIRST_LOOK:
+        x, y = shifts.T
+        moments = np.stack([x, y, x * x, x * y, y * y], axis=1)
+        triples = np.array(list(combinations(order[1:_CHOICE], 3)))
+        off = (moments[nearest] + moments[triples].sum(axis=1)) / 4 - moments.mean(axis=0)
+        best = triples[int(np.argmin(np.square(off).sum(axis=1)))].tolist()
+        order = [nearest, *best, *(i for i in order[1:] if i not in best)]
+    shifts = shifts[order]
     if len(more):
         shifts = np.concatenate([shifts, more - more.mean(axis=0)])
     return [(right, down) for right, down in shifts.tolist()]
