@@ -210,8 +210,10 @@ class CausticsPass:
         photons = job.targets["photons"].color_attachments[0]
         self._spread.bind(photon_irradiance=photons, opaque_axial_depth=depth, receiver_normal=normal)
         program = self._spread.program()
-    def begin(self, stack: ExitStack, job: FrameJob, *, again: bool = False) -> PhotonTracer:
-        """Prepare photon tracing in the scene of a job, and clear landed photons, unless more are added to them."""
+        bending = [body for body in job.scene.bodies if body.has_interface]
+        rough = all(body.surface is not None and body.surface.roughness > 0 for body in bending)
+        joined = 1 if job.few_opaque else len(_rounds(job.samples))
+        set_uniform(program, "enough", (ENOUGH_OF_ROUGH if rough else ENOUGH) / joined)
         job.targets["photon_spread"].use()
         self._gl.enable_only(moderngl.NOTHING)
         self._spread.draw_fullscreen(program)
