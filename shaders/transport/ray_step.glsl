@@ -333,7 +333,7 @@ int interact(inout Ray ray, out Ray weaker, Interaction at, ObjectRow body, Hit 
     on.throughput = ray.throughput * lobes.transmission;
     on.state = packed_state(depth, forks_of(ray), is_reflected(ray), interactions);
     on.interior = surface.interior;
-    on.blur += alpha * alpha * 0.25 * (ior_inside - 1.0) * (ior_inside - 1.0);
+    on.blur += alpha * alpha * refracted_spread(at, refracted);
     on.branch_code = ray.branch_code * 2u;
     on.outwards = at.normal;
     return branch(ray, weaker, back, on, again, bare == 1.0, last);

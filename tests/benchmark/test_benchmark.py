@@ -130,10 +130,19 @@ class TestPromises:
         published = json.loads((folder / "ours.json").read_text(encoding="utf-8"))["scenes"]
         assert set(published) == {scene.name for scene in SCENES}
         said = {scene.name: promise_kept(scene, published[scene.name]["score"]["block"]) for scene in SCENES}
-        assert {name for name, text in said.items() if "not kept" in text} == {"frosted-ball"}
+        assert {name for name, text in said.items() if "not kept" in text} == set()
         assert {name for name, text in said.items() if "Nothing is promised" in text} == {"caustic"}
         notes = tl.plan(scene_named("caustic").make()).unmodelled
         assert any("environment" in note and "focuses" in note for note in notes)
+
+    def test_frosted_glass_of_16_samples_is_no_more_blurred_than_noisy(self, renderer: tl.Renderer) -> None:
+        """A ball before a bright window: a blur that ignores how slants widen refraction has an error of .13."""
+        scene = scene_named("frosted-ball")
+        found = np.asarray(renderer.render(scene.make(), scene.size, samples=16).radiance)
+        score = score_picture(found, stored_truth_of(scene))
+        assert score.block < 0.09
+        assert score.nrmse < 0.12
+        assert max(map(abs, score.bias)) < 0.04
 
     def test_a_page_names_who_is_nearer_in_no_more_time_first(self, tmp_path: Path) -> None:
         pytest.importorskip("jinja2")
@@ -204,7 +213,8 @@ class TestCommand:
         pytest.importorskip("jinja2")
         names = [name for name in ("thin-plate", "wedge") if truth_path(name).is_file()]
         runner = CliRunner()
-        exported = runner.invoke(cli, ["benchmark", "export", str(tmp_path / "s"), "--only", ",".join(names)])
+        chosen = [text for name in names for text in ("--only", name)]
+        exported = runner.invoke(cli, ["benchmark", "export", str(tmp_path / "s"), *chosen])
         assert exported.exit_code == 0, exported.output
         (tmp_path / "mine").mkdir()
         with np.errstate(under="ignore"):

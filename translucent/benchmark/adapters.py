@@ -479,7 +479,6 @@ _ADAPTERS: tuple[Adapter, ...] = (
     ),
     _ours("ours-paths", "translucent, 64 paths", "random paths, 64 for each pixel", method=PathTraced(64, 77)),
     _blender("cycles", 64, "Blender Cycles", _PATHS, _NOT_NESTED),
-    # Not explained: EEVEE and Babylon.js draw the thin plate in a wrong color; Babylon has the right numbers.
     _blender("eevee", 64, "Blender EEVEE", _SCREEN, _NOT_NESTED),
     _web(THREE, "three.js", "MeshPhysicalMaterial, PMREM, transmission at full resolution, 16 samples", _GLTF),
     _web(BABYLON, "Babylon.js", "PBR with sub-surface refraction, filtered environment, 16 samples", _GLTF),

@@ -24,7 +24,10 @@ _FOLDER = click.Path(path_type=Path)
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 _DEBUG = click.option("--debug", is_flag=True, hidden=True)
 _ONLY = click.option(
-    "--only", metavar="SCENE,...", help="Use only these scenes, or groups of scenes such as scattering."
+    "--only",
+    multiple=True,
+    metavar="SCENE,...",
+    help="Use only these scenes, or groups of scenes such as scattering. Repeatable.",
 )
 
 
@@ -67,7 +70,7 @@ def list_scenes(as_json: bool, debug: bool) -> None:
 @click.argument("folder", type=_FOLDER)
 @_ONLY
 @_DEBUG
-def export(folder: Path, only: str | None, debug: bool) -> None:
+def export(folder: Path, only: tuple[str, ...], debug: bool) -> None:
     """Write the scenes into FOLDER as glTF, JSON and EXR files."""
     from translucent.benchmark.export import export_scenes
 
@@ -89,7 +92,7 @@ def export(folder: Path, only: str | None, debug: bool) -> None:
 @_ONLY
 @_JSON
 @_DEBUG
-def run(names: tuple[str, ...], output: Path, only: str | None, as_json: bool, debug: bool) -> None:
+def run(names: tuple[str, ...], output: Path, only: tuple[str, ...], as_json: bool, debug: bool) -> None:
     """Render the scenes with installed renderers, and score them.
 
     The results of each renderer are written to DIR/ADAPTER/, and packed into DIR/ADAPTER.zip, which you can send to
@@ -247,13 +250,13 @@ def _say(renderer: str, scene: str) -> None:
     echo(f"{renderer}: {scene}", err=True)
 
 
-def _chosen(only: str | None) -> list[BenchmarkScene]:
-    """Scenes that ``--only`` names, by name or group; none: all."""
+def _chosen(only: tuple[str, ...]) -> list[BenchmarkScene]:
+    """Scenes that ``--only`` names, by name or group, each time that it is given; none: all."""
     from translucent.benchmark.scenes import SCENES, scene_named
 
-    if only is None:
+    if not only:
         return list(SCENES)
-    words = [word.strip() for word in only.split(",")]
+    words = [word.strip() for text in only for word in text.split(",")]
     named = {scene.name for word in words for scene in SCENES if word == scene.group}
     named |= {scene_named(word).name for word in words if all(word != scene.group for scene in SCENES)}
     return [scene for scene in SCENES if scene.name in named]

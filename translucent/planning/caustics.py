@@ -253,7 +253,10 @@ def caustics_to_request(scene: Scene) -> tuple[Note, ...]:
     if not scene.lights:
         if not scene.environment_shadows:
             return ()
-        text = f"light of the environment that {object_names(clear)} focuses is missing; tl.PathTraced renders it"
+        text = (
+            f"light of the environment that {object_names(clear)} focuses is missing, below a sun a spot several times as "
+            "bright as the ground; tl.PathTraced renders it"
+        )
         return (Note(NoteKind.CAUSTICS, text),)
     text = (
         f"the caustic in the shadow of {object_names(clear)} is missing, a spot several times as bright as the "

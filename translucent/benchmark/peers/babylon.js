@@ -39,6 +39,7 @@ window.drawScene = async ({ home, size }) => {
   scene.activeCamera = container.cameras[0];
   const sky = scene.createDefaultSkybox(map, true, scene.activeCamera.maxZ * 0.9, 0, false);
   sky.material.imageProcessingConfiguration = scene.imageProcessingConfiguration;
+  for (const mesh of container.meshes) mesh.renderingGroupId = 1; // after the sky, which would hide a thin plate
   for (const light of container.lights) {
     if (light.getTypeID() !== 1) continue;
     const shadows = new ShadowGenerator(2048, light);

@@ -17,6 +17,9 @@ import mathutils
 #: glTF's (x, y, z) in Blender's axes, which are z up.
 AXES = mathutils.Matrix(((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1)))
 
+#: Cells of EEVEE's volumes along the view; twice as many are the most that it has.
+CELLS = 128
+
 
 def new_node(tree, kind, **values):
     """Add a node, with values for its inputs by name."""
@@ -98,7 +101,10 @@ def build(folder, engine, samples):
     scene.render.image_settings.file_format = "OPEN_EXR"
     scene.render.image_settings.color_depth = "32"
     scene.render.image_settings.color_mode = "RGB"
-    (use_cycles if engine == "cycles" else use_eevee)(scene, samples)
+    if engine == "cycles":
+        use_cycles(scene, samples)
+    else:
+        use_eevee(scene, samples, told)
 
 
 def set_camera(scene, told):
@@ -148,13 +154,19 @@ def use_cycles(scene, samples):
         setattr(cycles, f"{name}_bounces", 128)
 
 
-def use_eevee(scene, samples):
-    """Configure EEVEE: screen-space ray tracing, finest shadows and volumes."""
+def use_eevee(scene, samples, told):
+    """Configure EEVEE: screen-space ray tracing, finest shadows and volumes.
+
+    A sample takes a volume for as thick as the cells of a grid along the view, or does not see it, by chance. So thin
+    bodies get more cells: with the fewer ones they lose most of their color.
+    """
     scene.render.engine = "BLENDER_EEVEE"
     eevee = scene.eevee
     eevee.taa_render_samples, eevee.use_raytracing, eevee.use_shadows = samples, True, True
     eevee.ray_tracing_options.resolution_scale = "1"
-    eevee.volumetric_tile_size, eevee.volumetric_samples = "2", 128
+    bodies = [(bpy.data.objects[f"object_{i}"], one) for i, one in enumerate(told["objects"]) if one["type"] == "body"]
+    thin = any(CELLS * one["mean_chord"] < max(item.dimensions) for item, one in bodies)
+    eevee.volumetric_tile_size, eevee.volumetric_samples = "2", 2 * CELLS if thin else CELLS
 
 
 def main(engine, samples):

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import moderngl
 import numpy as np
+import numpy.typing as npt
 
-from translucent.formulas.sampling import FOOTPRINT_STEP
+from translucent.formulas.sampling import FOOTPRINT_STEP, MOST_POINTS, sobol_points
 from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.interfaces import NoInterface
@@ -60,8 +62,12 @@ MIRROR_ROOM = 0.06
 #: Pixels whose light is summed up before it is drawn: OpenGL need not have larger buffers.
 MOST_LIGHT = 1 << 20
 
-#: Samples of a pixel below which microfacets would be mere noise.
+#: Samples of a pixel from which on rays are traced where samples differ.
 FEW_SAMPLES = 4
+
+#: Standard deviation of one sample of rough interfaces without blur, divided by the error of blur alone: 1.1, 1.7 and
+#: 4.7 in three scenes, two balls and a pebble in different light, against path-traced truth. The geometric mean.
+NOISE_TO_BLUR = 2.0
 
 
 class TracedInterfacesPass:
@@ -108,7 +114,7 @@ class TracedInterfacesPass:
             "adaptive": int(job.bending),
             "faintest_throughput": faintest_throughput(forks),
             "most_interfaces": depth,
-            "sample_number": job.sample,
+            "microfacet_points": microfacet_points(job.sample),
             "blurred_fraction": 0.0 if job.plan.request.denoise else blurred_fraction(job.samples),
             "sample_width": job.samples**-0.5,
             "picture_first": int(_shows_more(job)),
@@ -292,10 +298,36 @@ def faintest_throughput(forks: int) -> float:
 def blurred_fraction(samples: int) -> float:
     """Fraction of the microfacet variance that blurs reflections; 1 with few samples.
 
-    The blur is smooth and somewhat wrong, the samples are right and noisy: their errors balance about so. Where a
-    denoiser follows, which takes out noise and keeps what is wrong, nothing is blurred.
+    The blur is smooth and somewhat wrong, the samples are right and noisy. With n samples and a fraction f, the blur
+    has an error f b, and the noise is at most s / sqrt(n), where s is the standard deviation of a sample without blur.
+    Both are equal where f is s / (b sqrt(n)), and then converge alike.
     """
-    return 1.0 if samples < FEW_SAMPLES else float(samples**-0.15)
+    return min(1.0, NOISE_TO_BLUR * float(samples**-0.5))
+
+
+def microfacet_points(sample: int) -> tuple[int, int, int, int]:
+    """Two Sobol points for the microfacets of a sample, each coordinate as 16 binary digits, the first one lowest."""
+    points = sobol_points(MOST_POINTS)[_microfacet_orders()[:, sample]]
+    digits = np.unpackbits((65536 * points.ravel()).astype(">u2").view(np.uint8).reshape(4, 2), axis=1)
+    first, second, third, fourth = (digits @ (1 << np.arange(16))).tolist()
+    return first, second, third, fourth
+
+
+@cache
+def _microfacet_orders() -> npt.NDArray[np.int64]:
+    """(2, MOST_POINTS): numbers of Sobol points in two random orders, in which 2^k points in a row stay well spread.
+
+    Without them the points of two interfaces would depend on each other. Each binary digit of a number is flipped or
+    not by chance, once for all numbers with the same higher digits (Burley 2020, "Practical hash-based Owen
+    scrambling").
+    """
+    random = np.random.default_rng(0)
+    numbers = np.arange(MOST_POINTS)
+    orders = np.zeros((2, MOST_POINTS), np.int64)
+    for digit in range(MOST_POINTS.bit_length() - 1):
+        flips = random.integers(0, 2, (2, MOST_POINTS >> (digit + 1)))
+        orders |= ((numbers >> digit & 1) ^ flips[:, numbers >> (digit + 1)]) << digit
+    return orders
 
 
 def traced_scene(job: FrameJob, stack: ExitStack) -> tuple[dict[str, moderngl.Texture], dict[str, Any]]:
