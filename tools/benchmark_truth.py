@@ -16,17 +16,15 @@ import importlib
 import sys
 import time
 import warnings
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
-import trimesh
 
 import translucent as tl
 from translucent.bench.truth import scene_parameters
+from translucent.benchmark.nesting import mitsuba_scene
 from translucent.benchmark.scenes import SCENES, BenchmarkScene, scene_named
 from translucent.benchmark.truth import (
     TruthAgreement,
@@ -39,7 +37,6 @@ from translucent.benchmark.truth import (
     truth_path,
     write_records,
 )
-from translucent.interop.mitsuba import units_per_metre
 
 #: Noise of a half that is wanted: of clear scenes, and of those that scatter.
 WANTED, WANTED_SCATTERING = 0.028, 0.076
@@ -122,7 +119,7 @@ def by_mitsuba(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            described = nested(made, scene.size) if made.overlap == "priority" else tl.to_mitsuba(made, scene.size)
+            described = mitsuba_scene(made, scene.size)
         described["sensor"]["far_clip"] = 1e9  # of a body 2000 m away
         loaded = mitsuba.load_dict(described)
     except tl.InputError as error:
@@ -136,63 +133,6 @@ def by_mitsuba(
     parts = parts.astype(np.float64)
     error = parts.std(axis=0, ddof=1) / np.sqrt(BATCHES)
     return agreement_with(name, paths, truth, (parts.mean(axis=0), error), EXPLAINED.get(scene.name, ""))
-
-
-def nested(made: tl.Scene, size: tuple[int, int]) -> dict[str, Any]:
-    """Bodies in each other for Mitsuba: each interface once, with the medium on either side of it.
-
-    A face belongs to its body where that body has the highest priority of all just behind the face, and not just
-    before it. `to_mitsuba` describes the rest of the scene, and each body by itself.
-    """
-    bodies = made.bodies
-    alone = [tl.to_mitsuba(replace(made, objects=[body]), size) for body in bodies]
-    units = np.array([units_per_metre(replace(made, objects=[body])) for body in bodies])
-    larger = units.min() / units
-    described = dict(alone[int(units.argmin())])
-    del described["object_0"]
-    for one, factor in zip(alone, larger, strict=True):
-        one["object_0"]["interior"]["scale"] /= factor
-    ranks = np.array([body.priority for body in bodies] + [-np.inf])
-    away = 1e-4 * made.diagonal
-    for i, body in enumerate(bodies):
-        corners = body.mesh.vertices[body.mesh.faces] @ body.matrix[:3, :3].T + body.matrix[:3, 3]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals *= away / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
-        middle = corners.mean(axis=1)
-        before, behind = (winners(bodies, middle + side * normals) for side in (1.0, -1.0))
-        path = Path(alone[i]["object_0"]["filename"])
-        header, data = path.read_bytes().split(b"end_header\n", 1)
-        vertices = np.frombuffer(data, "<f4", 18 * len(corners)).reshape(-1, 3, 6) * np.float32(
-            [larger[i]] * 3 + [1] * 3
-        )
-        for other in np.unique(before):
-            kept = (behind == i) & (before == other) & (ranks[before] < body.priority)
-            if not kept.any():
-                continue
-            part = path.with_name(f"{i}-{other}.ply")
-            count = int(kept.sum())
-            faces = np.zeros(count, np.dtype([("count", "u1"), ("corners", "<i4", 3)]))
-            faces["count"], faces["corners"] = 3, np.arange(3 * count).reshape(-1, 3)
-            text = header.replace(b"vertex %d\n" % (3 * len(corners)), b"vertex %d\n" % (3 * count))
-            text = text.replace(b"face %d\n" % len(corners), b"face %d\n" % count)
-            part.write_bytes(text + b"end_header\n" + vertices[kept].tobytes() + faces.tobytes())
-            shape = {**alone[i]["object_0"], "filename": str(part)}
-            if other < len(bodies):
-                outside = bodies[other].medium
-                shape["bsdf"] = {**shape["bsdf"], "ext_ior": float(outside.ior)}
-                shape["exterior"] = alone[other]["object_0"]["interior"]
-            described[f"interface_{i}_{other}"] = shape
-    return described
-
-
-def winners(bodies: Sequence[tl.Object], points: np.ndarray) -> np.ndarray:
-    """Index of the body with the highest priority at each point; the number of bodies where there is none."""
-    found = np.full(len(points), len(bodies))
-    for i in sorted(range(len(bodies)), key=lambda i: bodies[i].priority):
-        mesh, matrix = bodies[i].mesh, np.linalg.inv(bodies[i].matrix)
-        solid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-        found[solid.contains(points @ matrix[:3, :3].T + matrix[:3, 3])] = i
-    return found
 
 
 #: Why Mitsuba differs on a scene.

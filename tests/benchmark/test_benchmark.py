@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import zipfile
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,10 @@ from click.testing import CliRunner
 
 import translucent as tl
 from tests.benchmark.lambert import render
+from translucent.benchmark.adapters import ALL, Adapter, Session, run_adapter
 from translucent.benchmark.export import corner_thickness, divided, export_scene
 from translucent.benchmark.measures import _zoomed, score_picture, score_thickness, suspicions
+from translucent.benchmark.nesting import lacking_in_mitsuba, mitsuba_scene
 from translucent.benchmark.page import write_benchmark_page
 from translucent.benchmark.results import Results, SceneResult, merge, read_results, safe_name, unpacked
 from translucent.benchmark.scenes import FEATURES, SCENES, promise_kept, scene_named
@@ -159,6 +162,33 @@ class TestPromises:
         assert '<li><a href="#thick-ball">Ball</a>: Peer</li>' in text
         assert "up to 0.5%. Measured: 5." in text
         assert all(f"machine of {one}" in text for one in ("translucent", "Peer", "Slow"))
+
+
+class TestAdapters:
+    @pytest.mark.parametrize("error", [NotImplementedError("rough"), InputError("asked", "found", "do")])
+    def test_a_defect_is_a_failure_and_not_a_feature_that_is_lacking(self, error: Exception, tmp_path: Path) -> None:
+        def draw(scene: Any, folder: Path) -> Any:
+            raise error
+
+        adapter = Adapter("x", "X", "", ALL, str, lambda: nullcontext(Session(draw, "1")))
+        found = run_adapter(adapter, [scene_named("wedge")], tmp_path / "results").scenes["wedge"]
+        assert not found.lacking
+        assert str(error).split("; ")[0] in found.failure
+
+    def test_mitsuba_has_words_for_bodies_in_each_other_and_none_for_sums(self) -> None:
+        assert lacking_in_mitsuba(scene_named("core").make()) == ""
+        assert "overlap" in lacking_in_mitsuba(scene_named("two-media").make())
+
+    def test_mitsuba_gets_each_interface_of_nested_bodies_once(self, tmp_path: Path) -> None:
+        pytest.importorskip("mitsuba").set_variant("scalar_rgb")
+        made = scene_named("core").make()
+        described = mitsuba_scene(made, (8, 8), tmp_path, samples=2)
+        assert {name for name in described if name.startswith(("object", "interface"))} == {
+            "interface_0_2", "interface_1_0",
+        }  # fmt: skip
+        core = described["interface_1_0"]
+        assert core["bsdf"]["ext_ior"] == pytest.approx(1.33)
+        assert core["exterior"] == described["interface_0_2"]["interior"]
 
 
 class TestResultsOfStrangers:

@@ -28,6 +28,7 @@ import numpy.typing as npt
 from translucent.bench.experiment import one_line
 from translucent.benchmark.browser import BABYLON, FILAMENT, MODEL_VIEWER, THREE, WebRenderer, open_page
 from translucent.benchmark.export import export_scene, mean_chord
+from translucent.benchmark.nesting import lacking_in_mitsuba, mitsuba_scene
 from translucent.benchmark.results import (
     Results,
     SceneResult,
@@ -43,7 +44,6 @@ from translucent.benchmark.scenes import FEATURES, BenchmarkScene, Feature
 from translucent.errors import InputError, RenderError
 from translucent.files.images import read_exr
 from translucent.files.paths import make_folder
-from translucent.interop.mitsuba import to_mitsuba
 from translucent.interop.pyrender import load_pyrender
 from translucent.planning.interfaces import FrontInterface, ScreenInterfaces
 from translucent.planning.methods import BackFaceDepth, PathTraced, RayMarched, ThinLayer
@@ -214,10 +214,10 @@ def _mitsuba(paths: int) -> Adapter:
         mitsuba.set_variant(variant)
 
         def draw(scene: BenchmarkScene, folder: Path) -> Rendered:
-            try:
-                described = to_mitsuba(scene.make(), scene.size, folder, samples=paths)
-            except InputError as error:
-                raise SceneNotSupportedError(str(error)) from None
+            made = scene.make()
+            if lacking := lacking_in_mitsuba(made):
+                raise SceneNotSupportedError(lacking)
+            described = mitsuba_scene(made, scene.size, folder, samples=paths)
             described["sensor"]["far_clip"] = 1e9  # a scene is 2000 m away
             loaded = mitsuba.load_dict(described)
             np.array(mitsuba.render(loaded, seed=1))  # compiles

@@ -240,7 +240,7 @@ def describe(scene: Scene, size: tuple[int, int], samples: int = SAMPLES) -> tup
     size = check_size(size)
     if samples < 1:
         raise InputError(f"samples {samples}", "the number of samples must be at least 1", "use a value such as 256")
-    for found, do in _beyond(scene):
+    for found, do in beyond_mitsuba(scene):
         raise InputError("a scene for Mitsuba", found, do)
     rough = [body for body in scene.bodies if body.surface is not None and body.surface.roughness > ROUGH]
     if rough:
@@ -408,7 +408,7 @@ def _write_pfm(pixels: Array, path: Path) -> None:
     path.write_bytes(f"PF\n{width} {height}\n-1.0\n".encode() + pixels[::-1].astype("<f4").tobytes())
 
 
-def _beyond(scene: Scene) -> Iterator[tuple[str, str]]:
+def beyond_mitsuba(scene: Scene) -> Iterator[tuple[str, str]]:
     """Features of a scene that Mitsuba lacks, each with advice."""
     solids = [body for body in scene.bodies if body.sheet_thickness is None]
     groups = (
