@@ -254,8 +254,8 @@ def caustics_to_request(scene: Scene) -> tuple[Note, ...]:
         if not scene.environment_shadows:
             return ()
         text = (
-            f"light of the environment that {object_names(clear)} focuses is missing, below a sun a spot several times as "
-            "bright as the ground; tl.PathTraced renders it"
+            f"light of the environment that {object_names(clear)} focuses is missing, below a sun a spot several times "
+            "as bright as the ground; tl.PathTraced renders it"
         )
         return (Note(NoteKind.CAUSTICS, text),)
     text = (
