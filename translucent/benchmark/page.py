@@ -37,6 +37,12 @@ HOTTEST = 0.5
 #: Name of the results whose promises the page judges, and with whose time others are compared.
 OURS = "translucent"
 
+#: Why a renderer misses the truth of a scene by its design.
+EXPLAINED = {
+    ("thin-plate", "Blender EEVEE"): "the plate is thinner than the cells of its volumes, and each sample sees a whole "
+    "cell or none",
+}
+
 #: Colors of renderers in drawings (Okabe and Ito 2008).
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c6bb1", "#6b6b6b", "#a6761d")
 
@@ -242,6 +248,7 @@ def _scene_part(scene: BenchmarkScene, results: Sequence[Results]) -> ScenePart:
         text = f"{text}, noise of {judge.noise:.1%}"
         why = judge.explained or ("" if judge.within >= AGREEING else "not explained")
         said.append(f"{text}; {why}" if why else text)
+    said += [f"{row.name}: {EXPLAINED[scene.name, row.name]}" for row in rows if (scene.name, row.name) in EXPLAINED]
     plot = _plot([(row.ratio, row.nrmse, row.color, row.name) for row in rows])
     return ScenePart(scene, _shown(truth.radiance / white), truth.noise, said, rows, others, plot)
 
