@@ -139,7 +139,9 @@ def visible_points(renderer: Renderer, scene: Scene, size: tuple[int, int]) -> V
     """
     if len(scene.objects) != 1 or (medium := scene.objects[0].medium) is None:
         raise InputError(
-            "approximations of engines", f"the scene has {len(scene.objects)} objects", "use a scene with one body"
+            "comparison with game engines",
+            f"the scene has {len(scene.objects)} objects",
+            "use a scene with one body in a medium",
         )
     body = scene.objects[0]
     dark = replace(body, medium=Medium(medium.extinction, 0.0, medium.emission, ior=medium.ior))

@@ -139,7 +139,10 @@ class ReportPicture:
         """Raise `ValueError` if the picture is no base64, or its parts are of different shapes."""
         base64.b64decode(self.png, validate=True)
         if self.error is not None and self.invalid is not None and self.error.shape != self.invalid.shape:
-            raise ValueError(f"errors of shape {self.error.shape} and marks of shape {self.invalid.shape}")
+            raise ValueError(
+                f"the errors have the shape {self.error.shape}, and the mask of invalid pixels has the shape "
+                f"{self.invalid.shape}; measure again"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
