@@ -162,7 +162,9 @@ def write_benchmark_page(results: Sequence[Results], path: Path) -> None:
         raise InputError(f"page {str(path)!r}", "no scene has a score", "score pictures first")
     parts = [_scene_part(scene, results) for scene in SCENES if truth_path(scene.name).is_file()]
     shown = [part for part in parts if part.rows]
-    order = sorted(range(len(results)), key=lambda i: (_place(i, shown), results[i].name))
+    # The median of few scenes says little: renderers of more scenes stand first.
+    done = [sum(each.score is not None for each in one.scenes.values()) for one in results]
+    order = sorted(range(len(results)), key=lambda i: (-done[i], _place(i, shown), results[i].name))
     text = _templates().get_template("page.html.j2").render(
         results=[(i, results[i], COLORS[i % len(COLORS)], _place(i, shown), _times(i, shown)) for i in order],
         parts=parts,
