@@ -140,7 +140,7 @@ def test_values_that_a_shader_refuses_are_told_in_its_words(run: Run) -> None:
         "SCATTERS_AGAIN",
     ]
     options = [word for key in given for word in ("--define", f"{key}=0")]
-    assert "a walk needs a slot; choose other values of the switches" in one_error_line(
+    assert "a walk needs a slot; choose other values for --define" in one_error_line(
         run("fragment_lists_resolve", *options)
     )
     options[options.index("SLOTS=0")] = "SLOTS=2"

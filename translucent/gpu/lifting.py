@@ -368,7 +368,7 @@ def _decided(name: str, gathered: Gathered, defines: Mapping[str, int], missing:
             live.pop()
             done.pop()
         elif live[-1] and word == "error" and not missing:
-            raise InputError(f"shader {name!r}", rest, "choose other values of the switches")
+            raise InputError(f"shader {name!r}", rest, "choose other values for --define")
         elif live[-1] and not word:
             yield file, line
 
