@@ -176,7 +176,12 @@ def test_convex_is_what_back_face_depth_is_exact_for() -> None:
         ),
         ([body(), body(None), body(None)], None, 0, "2 opaque objects: depth and color of the nearest"),
         ([body()], tl.BackFaceDepth(), 0, "requested: nearest front face, then farthest back face"),
-        ([body(mesh=OPEN), body()], None, 2, "thickness of the closed bodies, in the pixels of the open bodies"),
+        (
+            [body(mesh=OPEN), body()],
+            None,
+            2,
+            "pixels that open meshes cover also need the thickness of the closed bodies",
+        ),
         ([body(FIRE), body(WINE)], None, 0, "emission among several media: a medium dims the emission behind it; one "),
         ([body()], tl.FragmentLists(), 0, "requested; one draw fills a list for each pixel, which is then sorted"),
         ([body()], tl.KBuffer(5), 0, "requested; one draw; each pixel keeps the 5 nearest surfaces"),

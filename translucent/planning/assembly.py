@@ -204,7 +204,7 @@ def _fallback_passes(scene: Scene, spectral: bool) -> tuple[PassSpec, ...]:
     closed = tuple(i for i in solids_of(scene) if i not in leaky)
     if not closed:
         return (as_sheets,)
-    reason = "pixels that open meshes cover also need the thickness of the closed bodies behind and before them"
+    reason = "pixels that open meshes cover also need the thickness of the closed bodies"
     cost = SignedDepth.cost_for(spectral=spectral)
     return (as_sheets, PassSpec(PassName.SIGNED_DEPTH_FALLBACK, reason, closed, 1, "fallback", cost))
 
