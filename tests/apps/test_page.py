@@ -201,6 +201,18 @@ def test_many_triangles_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     assert triangles(planned.scene) == 320
 
 
+def test_pages_say_that_they_show_no_caustics() -> None:
+    """The page says it, and advises nothing that pages do not have."""
+    ground = tl.Object(ball().mesh, None, transform=np.diag([9.0, 0.1, 9.0, 1.0]))
+    glass, light = ball(medium=tl.Medium(1.0, ior=1.5)), tl.DirectionalLight((0, -1, 0), 1.0)
+    planned = plan_page(scene_of(glass, ground, lights=[light]))
+    (own,) = [note for note in planned.own_notes if note.kind is NoteKind.CAUSTICS]
+    assert [note for note in planned.notes if note.kind is NoteKind.CAUSTICS] == [own]
+    assert "pages show no caustics" in str(own)
+    assert "--caustics" not in str(own)
+    assert not any(note.kind is NoteKind.CAUSTICS for note in plan_page(scene_of(glass, lights=[light])).notes)
+
+
 def test_pages_say_that_rays_read_no_textures_there(tmp_path: Path) -> None:
     scene = TEXTURED["painted cube in glass"]
     planned = plan_page(scene)

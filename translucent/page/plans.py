@@ -11,6 +11,7 @@ from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
 from translucent.media.medium import Medium
+from translucent.planning.caustics import caustics_to_request
 from translucent.planning.interfaces import FrontInterface
 from translucent.planning.methods import DepthPeeling
 from translucent.planning.passes import Note, NoteKind, PassName
@@ -171,7 +172,9 @@ class PagePlan:
     @property
     def notes(self) -> tuple[Note, ...]:
         """Notes on effects that the page leaves out or approximates."""
-        return (*self.own_notes, *self.plan.limits, *self.plan.unmodelled, *self.plan.remarks)
+        lit = bool(self.scene.lights)  # their caustics are among the page's own notes
+        rest = (note for note in self.plan.unmodelled if not (lit and note.kind is NoteKind.CAUSTICS))
+        return (*self.own_notes, *self.plan.limits, *rest, *self.plan.remarks)
 
     @property
     def own_notes(self) -> tuple[Note, ...]:
@@ -185,6 +188,8 @@ class PagePlan:
                 "loses there; thickness and transmittance are exact"
             )
             found.append(Note(NoteKind.UNLIT, text))
+        if self.scene.lights and any(note.kind is NoteKind.CAUSTICS for note in self.plan.unmodelled):
+            found += caustics_to_request(self.scene, "pages show no caustics, but pictures do (translucent render)")
         if (count := triangles(self.scene)) > MANY_TRIANGLES:
             text = f"{count:,} triangles are slow in a browser; --simplify 300000 writes a coarser copy"
             found.append(Note(NoteKind.MANY_TRIANGLES, text))

@@ -237,8 +237,15 @@ def gathers_light(scene: Scene) -> bool:
     return bool(scene.lights and caustics_to_request(scene)) and not refused and not scatters
 
 
-def caustics_to_request(scene: Scene) -> tuple[Note, ...]:
-    """Note on light that clear bodies focus onto opaque objects; photons would show that of lights."""
+def caustics_to_request(scene: Scene, do: str = "add --caustics (tl.Caustics())") -> tuple[Note, ...]:
+    """Note on light that clear bodies focus onto opaque objects; photons would show that of lights.
+
+    Parameters
+    ----------
+    scene : Scene
+    do : str
+        What shows the caustics of lights.
+    """
     clear = [
         body
         for body in scene.bodies
@@ -260,7 +267,7 @@ def caustics_to_request(scene: Scene) -> tuple[Note, ...]:
         return (Note(NoteKind.CAUSTICS, text),)
     text = (
         f"the caustic in the shadow of {object_names(clear)} is missing, a spot several times as bright as the "
-        "ground: add --caustics (tl.Caustics())"
+        f"ground: {do}"
     )
     return (Note(NoteKind.CAUSTICS, text),)
 
