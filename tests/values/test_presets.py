@@ -53,9 +53,9 @@ COLORS = {
 SCATTERING = {
     "jade": ((0.20, 0.25, 0.22), 0.15),
     "wax": ((0.5, 0.5, 0.5), 0.35),
-    "soap": ((1.0, 1.0, 1.0), 0.3),
+    "soap": ((0.6, 0.6, 0.6), 0.4),
     "paraffin": ((1.2, 1.2, 1.2), 0.35),
-    "beeswax": ((0.5, 0.5, 0.5), 0.3),
+    "beeswax": ((0.5, 0.5, 0.5), 0.4),
 }
 
 #: Roughness of clear ones whose surfaces are not polished.
