@@ -194,12 +194,18 @@ def test_highlights_in_rough_interfaces(renderer: tl.Renderer, roughness: float)
         assert abs(off.mean()) <= 2e-3
 
 
-@pytest.mark.parametrize("opaque", [False, True], ids=["interface", "opaque"])
-def test_a_mirror_shows_a_disc(renderer: tl.Renderer, opaque: bool) -> None:
+@pytest.mark.parametrize(
+    "opaque, backend", [(False, "opengl"), (True, "opengl"), (False, "cpu")], ids=["interface", "opaque", "on the CPU"]
+)
+def test_a_mirror_shows_a_disc(renderer: tl.Renderer, opaque: bool, backend: str) -> None:
     """Radiance of the sphere times the reflectance where mirrored rays hit it."""
     surface = tl.Surface(roughness=0.0, metallic=1.0, color=(0.5, 0.5, 0.5)) if opaque else tl.Surface()
     scene = wall(surface, opaque=opaque)
-    found = renderer.render(scene, (64, 48)).radiance[..., 0].astype(np.float64)
+    if backend == "cpu":
+        with tl.Renderer(backend="cpu") as cpu:
+            found = cpu.render(scene, (64, 48)).radiance[..., 0].astype(np.float64)
+    else:
+        found = renderer.render(scene, (64, 48)).radiance[..., 0].astype(np.float64)
     origins, directions = scene.camera.rays((64, 48))
     points = origins + ((0.1 - origins[..., 2:]) / directions[..., 2:]) * directions
     mirrored = directions * (1.0, 1.0, -1.0)

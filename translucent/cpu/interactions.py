@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array, Integers
+from translucent.arrays import Array, Integers, Mask
 from translucent.cpu.interior_list import Branches
 from translucent.diffusion.interfaces import InterfaceTable
 from translucent.formulas import optics
@@ -22,6 +23,7 @@ from translucent.reference.hits import Rays
 from translucent.reference.light_paths import SurfaceLight
 from translucent.reference.surfaces import interface_surfaces
 from translucent.scene.lights import PositionalLight
+from translucent.scene.scene import Light
 
 #: Interfaces of a ray that have points of their own; later interfaces take them again, with other offsets.
 INTERFACES = 8
@@ -81,6 +83,9 @@ def _hashed(key: npt.NDArray[np.uint32]) -> Array:
         key = key ^ (key >> np.uint32(16))
     return key.astype(np.float64) * 2.0**-32
 
+
+#: Alpha of the microfacets in which polished interfaces mirror sphere lights, as on the GPU.
+SMALLEST_HIGHLIGHT = 1e-3
 
 #: Fraction of light below which a microfacet counts as blocked.
 LEAST_LET_OUT = 1e-6
@@ -241,16 +246,20 @@ class InterfaceLight:
     ----------
     table : InterfaceTable
     light : SurfaceLight
-        On diffuse bases, and reflected in rough interfaces.
+        On diffuse bases, and reflected in interfaces.
     """
 
     def __init__(self, table: InterfaceTable, light: SurfaceLight) -> None:
         self.table, self.light = table, light
+        self._spheres = [one for one in light.paths.lights if isinstance(one, PositionalLight) and one.disc[3] > 0.0]
         self._through = table.column("diffuse_transmission")
         self._through_color = table.column("diffuse_transmission_color")
 
-    def radiance(self, rays: Rays, found: BranchInteractions) -> Array:
-        """(k, 3): radiance at the origins of rays, in metres from the eye, against their directions."""
+    def radiance(self, rays: Rays, found: BranchInteractions, first: Mask) -> Array:
+        """(k, 3): radiance at the origins of rays, in metres from the eye, against their directions.
+
+        Polished interfaces mirror sphere lights where they are the `first` (k,) on the ray of the camera.
+        """
         radiance, at = found.emitted.copy(), found.at
         if (found.transmission < 1.0).any():
             self._add_diffuse(radiance, rays, found)
@@ -264,7 +273,20 @@ class InterfaceLight:
         coats = np.flatnonzero((at.coat > 0) & (found.coat_roughness > 0))
         if coats.size:
             self._add_highlights(radiance, rays, at.where(coats), coats, found.coat_roughness[coats] ** 2, None)
+        if self._spheres:
+            self._add_mirrored_spheres(radiance, rays, found, first)
         return radiance
+
+    def _add_mirrored_spheres(self, radiance: Array, rays: Rays, found: BranchInteractions, first: Mask) -> None:
+        polished = np.flatnonzero(first & (found.alpha == 0.0) & (found.at.ior != 1.0))
+        if polished.size:
+            below, alpha = found.at.where(polished), np.full(len(polished), SMALLEST_HIGHLIGHT)
+            left = 1.0 - below.coat_reflectance()
+            self._add_highlights(radiance, rays, below, polished, alpha, left, self._spheres)
+        coats = np.flatnonzero(first & (found.at.coat > 0) & (found.coat_roughness == 0))
+        if coats.size:
+            alpha = np.full(len(coats), SMALLEST_HIGHLIGHT)
+            self._add_highlights(radiance, rays, found.at.where(coats), coats, alpha, None, self._spheres)
 
     def _add_diffuse(self, radiance: Array, rays: Rays, found: BranchInteractions) -> None:
         weight = found.transmittance * (1.0 - found.transmission[:, None])
@@ -278,14 +300,22 @@ class InterfaceLight:
             radiance[diffuse] += weight[diffuse] * diffuse_radiance(front, back, color, behind, through)
 
     def _add_highlights(
-        self, radiance: Array, rays: Rays, at: Interaction, chosen: Integers, alpha: Array, below: Array | None
+        self,
+        radiance: Array,
+        rays: Rays,
+        at: Interaction,
+        chosen: Integers,
+        alpha: Array,
+        below: Array | None,
+        lights: Sequence[Light] | None = None,
     ) -> None:
         """Add single reflections of lights, as far as their light reaches the `chosen` interfaces straight on.
 
-        `below` is the fraction (k, 1) that clear coats leave of those; without it they are of the coats.
+        `below` is the fraction (k, 1) that clear coats leave of those; without it they are of the coats. Without
+        `lights`, it is all of them.
         """
         points, to_eye = rays.origins[chosen], -at.direction
-        for light in self.light.paths.lights:
+        for light in self.light.paths.lights if lights is None else lights:
             if isinstance(light, PositionalLight):
                 to_light = unit(np.asarray(light.position) - points)
             else:

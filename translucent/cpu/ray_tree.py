@@ -29,7 +29,7 @@ from translucent.cpu.interior_list import (
 )
 from translucent.cpu.surroundings import Surroundings, first_footprints, moved_on, split_footprints
 from translucent.diffusion.field import DiffusionField
-from translucent.diffusion.interfaces import InterfaceTable
+from translucent.diffusion.interfaces import AIR, InterfaceTable
 from translucent.formulas import optics
 from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS, scattered_ahead
 from translucent.formulas.interface import reflected_direction, refracted_direction
@@ -498,7 +498,8 @@ class _Growth:
         """Reflected and refracted branches that are followed; `there` are the interior lists behind the interfaces."""
         pixel = self.pixel[branches.owner]
         found = interact(self.table, self.channel, self.caster, branches, places, pixel, self.spread)
-        self._add(branches, self.light.radiance(self._rays(branches), found))
+        first = (branches.depth == 0) & (places.before == AIR)
+        self._add(branches, self.light.radiance(self._rays(branches), found, first))
         self._add_coats(branches, found)
         branches = replace(branches, depth=branches.depth + 1)
         back, on = self._both(branches, there, found)

@@ -311,6 +311,8 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
             "and without details smaller than a cell of the diffusion grid: spikes and edges are up to 15 % too "
             "dark"
         )
+        if scene.lights:
+            text += "; where lights shine from behind, bodies are up to 45 % too dark"
         if len(scene.bodies) > 1:
             text += "; a body next to another body is up to 10 % too dark"
         ahead = [body.medium is not None and body.medium.anisotropy >= STRONGLY_AHEAD for body in bodies]
