@@ -195,7 +195,9 @@ def test_highlights_in_rough_interfaces(renderer: tl.Renderer, roughness: float)
 
 
 @pytest.mark.parametrize(
-    ("opaque", "backend"), [(False, "opengl"), (True, "opengl"), (False, "cpu")], ids=["interface", "opaque", "on the CPU"]
+    ("opaque", "backend"),
+    [(False, "opengl"), (True, "opengl"), (False, "cpu")],
+    ids=["interface", "opaque", "cpu"],
 )
 def test_a_mirror_shows_a_disc(renderer: tl.Renderer, opaque: bool, backend: str) -> None:
     """Radiance of the sphere times the reflectance where mirrored rays hit it."""
