@@ -87,6 +87,9 @@ def _hashed(key: npt.NDArray[np.uint32]) -> Array:
 #: Alpha of the microfacets in which polished interfaces mirror sphere lights, as on the GPU.
 SMALLEST_HIGHLIGHT = 1e-3
 
+#: Of a light's irradiance, in 1/sr, for which occluders are not looked for, as on the GPU.
+FAINTEST_HIGHLIGHT = 1e-6
+
 #: Fraction of light below which a microfacet counts as blocked.
 LEAST_LET_OUT = 1e-6
 
@@ -338,6 +341,7 @@ class InterfaceLight:
                 reflectance = below * at.lobes(optics.fresnel_dielectric(cos_facet, at.ior), cos_facet)[0].reflection
             value = microfacet_value(cos_half, cos_light, at.cosine(at.normal), alpha) * peak
             with np.errstate(under="ignore"):
-                reflected = reflectance * value[:, None] * light.irradiance_on(points, at.normal)
-                lit = np.flatnonzero(reflected.any(axis=1))
+                share = reflectance * value[:, None]
+                reflected = share * light.irradiance_on(points, at.normal)
+                lit = np.flatnonzero((share > FAINTEST_HIGHLIGHT).any(axis=1) & reflected.any(axis=1))
                 radiance[chosen[lit]] += reflected[lit] * self.light.to_interfaces(light, points[lit])
