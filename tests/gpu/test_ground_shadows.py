@@ -67,6 +67,8 @@ def test_a_wall_takes_what_lambert_says(renderer: tl.Renderer) -> None:
 def test_the_map_is_that_of_the_points(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     """Below the bounds of the body, where no direction is blurred, it differs by what its texels make of edges."""
     ball = Sphere(center=(0.0, 1.001, 0.0), radius=1.0).tessellate(32)
+    # So small a picture needs few texels.
+    monkeypatch.setattr("translucent.gpu.passes.shadow_maps.PIXELS_OF_TEXEL", 0.5)
     found, points = light_left(renderer, ball, directions=32)
     monkeypatch.setattr("translucent.gpu.passes.shadow_maps._mapped_ground", lambda job: None)
     expected, _ = light_left(renderer, ball, directions=32)
