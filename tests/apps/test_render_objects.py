@@ -153,7 +153,7 @@ def test_a_time(shown: Any, bar: Path) -> None:
             "object 'Glas'; no object has this name; use one of 'Box 0', 'Box 1', 'Box 2'",
         ),
         ("--object Box --preset merlot", "did you mean Box 2, Box 1 or Box 0?"),
-        ("--object Glass", "--object 'Glass'; no medium is given for this object; add --preset NAME, or"),
+        ("--object Glass", "--object 'Glass'; no medium is given for this object; after the name, add --preset NAME"),
         (
             "--object A --preset merlot --object A --preset jade",
             "--object 'A'; the object is named twice; give the object one medium",

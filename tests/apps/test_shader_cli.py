@@ -94,11 +94,11 @@ def test_a_switch_without_a_value_is_on(run: Run) -> None:
         (["signed_depth", "--define", "OPAQUE=0"], "the shader needs 1 switch more switches; add --define SPECTRAL=0"),
         (
             [*SIGNED, "--define", "SPECTRUM=1"],
-            "the shader has no switch SPECTRUM; the switches of this shader are: OPAQUE, SPECTRAL",
+            "the shader has no switch SPECTRUM; use one of its switches: OPAQUE, SPECTRAL",
         ),
         (
             ["optics", "--define", "FAST=1"],
-            "the shader has no switch FAST; the switches of this shader are: it has none",
+            "the shader has no switch FAST; omit --define, because this shader has no switches",
         ),
         (
             ["signed_depth", "--define", "OPAQUE=yes"],

@@ -282,7 +282,9 @@ def test_what_says_nothing_of_its_scale_is_refused(ramp: np.ndarray, tmp_path: P
         load_thickness_map(tmp_path / "t.jpg")
     for suffix in (".exr", ".png", ".npy", ".npz"):
         (tmp_path / f"broken{suffix}").write_bytes(b"not what it says")
-        with pytest.raises(tl.InputError, match=r"cannot be read|not an OpenEXR file|not an image|not a NumPy array"):
+        with pytest.raises(
+            tl.InputError, match=r"cannot be read|not an OpenEXR file|not a readable image|not a NumPy array"
+        ):
             load_thickness_map(tmp_path / f"broken{suffix}")
 
 

@@ -159,7 +159,7 @@ def test_unknown_backend_and_size_are_refused(renderer: tl.Renderer) -> None:
     for size in ((0, 10), (10, -1), (10.5, 10), "ab", (10,)):
         with pytest.raises(tl.InputError, match="frame size"):
             renderer.render(scene, size)  # type: ignore[arg-type]
-    with pytest.raises(tl.InputError, match="samples 0; not a whole number"):
+    with pytest.raises(tl.InputError, match="samples 0; the number of samples must be a whole number"):
         renderer.render(scene, (8, 8), samples=0)
     with pytest.raises(tl.RenderError, match=r"frame size 1000000x2; this OpenGL allows at most \d+"):
         renderer.render(scene, (1_000_000, 2))

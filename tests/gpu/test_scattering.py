@@ -404,7 +404,7 @@ def test_an_opengl_that_cannot_follow_lights_marks_what_they_light(
     with (
         without_shader_storage(monkeypatch) as renderer,
         pytest.warns(
-            tl.TranslucentWarning, match=r"pixels that show scattering media are marked as invalid|leaves out light"
+            tl.TranslucentWarning, match=r"pixels that show scattering media are marked as invalid|leaves out the light"
         ),
     ):
         frame = renderer.render(scene, SIZE, scattering=ONCE)

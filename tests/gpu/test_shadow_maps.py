@@ -436,7 +436,7 @@ def test_sizes_that_are_none_are_refused(size: Any) -> None:
 
 
 def test_other_choices_of_shadows_are_refused(renderer: tl.Renderer) -> None:
-    with pytest.raises(tl.InputError, match="shadows 1024; not a choice of shadows; give for example"):
+    with pytest.raises(tl.InputError, match="shadows 1024; this is not a choice of shadows; give for example"):
         renderer.render(scene("ball", "sun"), (16, 12), shadows=1024)  # type: ignore[arg-type]
 
 

@@ -327,5 +327,5 @@ def test_pictures_of_normals_and_error(renderer: tl.Renderer, tmp_path: Any) -> 
     frame, truth = renderer.render(scene, SIZE), tl.reference.render(scene, SIZE, refraction=False)
     names = {path.name for path in frame.save_aovs(tmp_path, truth)}
     assert names == {"thickness.png", "transmittance.png", "validity.png", "normals.png", "error.png"}
-    with pytest.raises(tl.InputError, match="truth of a frame; it has 8x8 pixels, and the frame 160x120"):
+    with pytest.raises(tl.InputError, match="truth of a frame; the truth has 8x8 pixels, and the frame has 160x120"):
         frame.save_aovs(tmp_path, tl.reference.render(scene, (8, 8), refraction=False))

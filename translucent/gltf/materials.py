@@ -397,7 +397,8 @@ def _warnings(found: GltfMaterial, entry: Json, extensions: Json, volume: Json) 
     notes += [f"{key} excludes {VOLUME}" for key in EXCLUDED if key in extensions]
     black = [c for c, value in zip(("red", "green", "blue"), found.attenuation_color, strict=True) if value == 0]
     if black and math.isfinite(found.attenuation_distance):
-        notes.append(f"attenuationColor {' and '.join(black)} is 0 and was read as {BLACKEST:g}, to stay finite")
+        verb = "is" if len(black) == 1 else "are"
+        notes.append(f"attenuationColor {' and '.join(black)} {verb} 0 and was read as {BLACKEST:g}, to stay finite")
     if found.ior == 0:
         notes.append(f"ior is 0 and was read as {DEFAULT_IOR:g}")
     if found.thickness == 0 and math.isfinite(found.attenuation_distance):

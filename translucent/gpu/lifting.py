@@ -307,11 +307,11 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
         raise InputError(f"target {target!r}", "no target has this name", f"use one of {', '.join(get_args(Dialect))}")
     gathered = gather(name)
     if unknown := sorted(defines.keys() - gathered.switches):
-        known = ", ".join(sorted(gathered.switches)) or "(none)"
+        known = ", ".join(sorted(gathered.switches))
         raise InputError(
             f"shader {name!r}",
             f"the shader has no switch {', '.join(unknown)}",
-            f"the switches of this shader are: {known}",
+            f"use one of its switches: {known}" if known else "omit --define, because this shader has no switches",
         )
     missing: set[str] = set()
     parts = list(_parts(_decided(name, gathered, defines, missing)))
