@@ -20,6 +20,7 @@ from translucent.formulas import (
     tone,
     two_stream,
 )
+from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.media import density
 from translucent.scene import camera, environment
 
@@ -173,6 +174,19 @@ def _ahead_arguments() -> list[np.ndarray]:
     grids = [0, 1e-3, 0.5, 3, 30, 1e4], [0.0, 0.3, 0.9], [0.05, 0.4, 0.9, 0.98], [-1.0, 0.0, 0.75, 1.0]
     depth, ahead, anisotropy, cosine = _mixed(*map(np.array, grids))
     return [_triples(depth), np.repeat(ahead[:, None], 3, axis=1), anisotropy, cosine]
+
+
+def _ahead_mirrored_arguments() -> list[np.ndarray]:
+    """Cosines, interfaces, depths and g; beside the critical angle, at which the reflectance begins to be whole."""
+    rows = [
+        (cosine, ior, diffuse_interface(ior).reflected, diffuse_interface(ior).reflected_flux, depth, g)
+        for cosine in (0.05, 0.4, 0.6, 0.8, 0.9, 0.97, 1.0)
+        for ior in (1.0, 1.2, 1.33, 1.5, 2.4)
+        for depth in (0.0, 1e-3, 0.5, 3.0, 30.0, 1e4)
+        for g in (0.05, 0.6, 0.98)
+    ]
+    cosine, ior, reflected, reflected_flux, depth, g = np.array(rows, np.float32).T
+    return [cosine, ior, reflected, reflected_flux, _triples(depth), g]
 
 
 def _harmonic_arguments() -> list[np.ndarray]:
@@ -357,6 +371,7 @@ ARGUMENTS = {
     "first_events_excess": _first_event_arguments(1),
     "mean_first_events_excess": _first_event_arguments(2),
     "scattered_ahead": _ahead_arguments(),
+    "ahead_mirrored": _ahead_mirrored_arguments(),
     "real_harmonics": [np.concatenate([_unit_vectors(), np.eye(3, dtype=np.float32), -np.eye(3, dtype=np.float32)])],
     "scattered_radiance": _harmonic_arguments(),
     "exit_lobe": _mixed(UNIT, np.array([1.0, 1.0001, 1.33, 1.5, 2.4]), np.array([0.5, 0.91, 1.0])),
@@ -392,6 +407,7 @@ ROUNDINGS = dict.fromkeys(ARGUMENTS, 16.0) | {
     "tone_agx": 64.0,  # powers
 }
 FLOOR = {
+    "ahead_mirrored": 1e-3,  # drivers find angles to 4e-4
     "scattered_ahead": 2e-5,  # differences of moments of order 0
     "first_events_excess": 1e-5,  # less 1
     "mean_first_events_excess": 1e-5,

@@ -2,6 +2,7 @@
 // the float32 twin of the same name in translucent/formulas/diffusion.py, where it is derived.
 
 #include <constants>
+#include "lib/optics.glsl"
 #include "lib/phase.glsl"
 
 // Radiance times 4 pi, inside a body below its surface and towards it, of light that has been scattered: fluence phi at the
@@ -51,4 +52,15 @@ vec3 scattered_ahead(vec3 depth, vec3 ahead, float anisotropy, float cos_scatter
         sum += probability * beyond;
     }
     return max(sum, vec3(0.0));
+}
+
+// Fraction of forward-scattered light that an interface mirrors where a ray leaves a medium, after a depth of events ahead:
+// Fresnel's reflectance of the ray where the light still goes as the ray does, less or more where it is spread.
+vec3 ahead_mirrored(float cosine, float ior, float reflected, float reflected_flux, vec3 depth, float anisotropy) {
+    vec3 s = max(depth / anisotropy, vec3(1e-3));
+    vec3 mean_cosine = max(transmittance((1.0 - anisotropy) * s) - transmittance(s), vec3(0.0)) / opacity(s);
+    float diffuse = reflected - 2.0 * cosine * (reflected - reflected_flux);
+    float beside = abs(asin(1.0 / ior) - acos(clamp(cosine, 0.0, 1.0)));
+    float ray = fresnel_dielectric(cosine, 1.0 / ior);
+    return diffuse + (ray - diffuse) * pow(mean_cosine, vec3(AHEAD_ANGLE / max(beside, 1e-3)));
 }

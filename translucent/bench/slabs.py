@@ -19,7 +19,7 @@ from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.solution import BodySystem
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface
-from translucent.formulas.diffusion import in_scattered_shares
+from translucent.formulas.diffusion import ahead_mirrored, in_scattered_shares
 from translucent.formulas.two_stream import (
     mirrored_reflectance,
     mirrored_transmittance,
@@ -144,10 +144,15 @@ def _ahead(albedo: float, depth: float, anisotropy: float, ior: float) -> tuple[
     ahead = np.exp(-depth * (1.0 - albedo * anisotropy) / mu) - np.exp(-depth / mu)
     again = reflected * np.exp(-depth / mu)
     across = ahead / (1.0 - again**2)
-    back, on = (float((flux * part).sum() / flux.sum()) for part in (across * again, across))
     # On the mean path of diffuse light across a slab, twice its thickness.
-    far, near = map(float, in_scattered_shares(diffuse_interface(ior).reflected, np.exp(-2.0 * depth * (1.0 - albedo))))
-    return far * back + near * on, far * on + near * back
+    interface = diffuse_interface(ior)
+    far, near = in_scattered_shares(interface.reflected, np.exp(-2.0 * depth * (1.0 - albedo)))
+    mirrored = ahead_mirrored(
+        mu, ior, interface.reflected, interface.reflected_flux, albedo * anisotropy * depth / mu, anisotropy or 1.0
+    )
+    leaving, turned = 1.0 - mirrored + mirrored * far, mirrored * near
+    back, on = across * (again * leaving + turned), across * (leaving + again * turned)
+    return float((flux * back).sum() / flux.sum()), float((flux * on).sum() / flux.sum())
 
 
 @cache

@@ -31,7 +31,8 @@ from translucent.cpu.surroundings import Surroundings, first_footprints, moved_o
 from translucent.diffusion.field import DiffusionField
 from translucent.diffusion.interfaces import AIR, InterfaceTable
 from translucent.formulas import optics
-from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS, scattered_ahead
+from translucent.formulas.diffuse_interface import diffuse_interface
+from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS, ahead_mirrored, scattered_ahead
 from translucent.formulas.interface import reflected_direction, refracted_direction
 from translucent.geometry.ray_caster import dot, unit
 from translucent.reference.compositing import composite, emission_of_mixtures
@@ -138,6 +139,17 @@ class DiffusionFields:
         found = np.ones(len(body))
         for number, field in self._fields.items():
             found[body == number] = field.ior
+        return found
+
+    def mirrored_ahead(self, body: Integers, cosine: Array, depth: Array) -> Array:
+        """(k, 3): fractions of forward-scattered light that interfaces of bodies (k,) mirror: see `ahead_mirrored`."""
+        found = np.zeros(depth.shape)
+        for number, field in self._fields.items():
+            chosen, interface = np.flatnonzero(body == number), diffuse_interface(field.ior)
+            shares = interface.reflected, interface.reflected_flux
+            found[chosen] = ahead_mirrored(
+                cosine[chosen, None], field.ior, *shares, depth[chosen], field.phase.mean_cosine
+            )
         return found
 
     def environment_behind(self, body: Integers, directions: Array, depth: Array, other: Array) -> Array:
@@ -415,11 +427,13 @@ class _Growth:
             points = own.origins + length[:, None] * own.directions
             normals, _ = self.caster.facing_normals(face, points, own.directions)
             ior = self.tree.diffused.ior(body)
-            mirrored = optics.fresnel_dielectric(-dot(own.directions, normals), 1.0 / ior)[:, None]
+            cosine = -dot(own.directions, normals)
             leaving = refracted_direction(own.directions, normals, 1.0 / ior)
-            leaving = np.where(mirrored < 1.0, leaving, own.directions)
+            leaves = optics.fresnel_dielectric(cosine, 1.0 / ior)[:, None] < 1.0
+            leaving = np.where(leaves, leaving, own.directions)
             blurred = self.tree.surroundings.blurred(own, leaving, IN_SCATTERED_ROUGHNESS)
             depth = -np.log(np.maximum(passed, np.finfo(np.float64).tiny)) * ahead
+            mirrored = self.tree.diffused.mirrored_ahead(body, cosine, depth)
             seen = self.tree.diffused.environment_behind(body, leaving, depth, blurred)
             self._add(own, (through - passed) * ((1.0 - mirrored) * seen + mirrored * (far * behind + near * before)))
 

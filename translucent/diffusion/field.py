@@ -34,7 +34,6 @@ from translucent.diffusion.solution import BodySystem, DiffuseSolution
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, exit_quadrature
 from translucent.formulas.diffusion import (
-    IN_SCATTERED_REFLECTED,
     LEAST_COSINE,
     UNIFORM_COSINE,
     emergent_radiance,
@@ -105,8 +104,6 @@ class DiffusionField:
         Fraction of its extinction by light that is scattered ahead, g sigma_s / sigma_t: unscattered light here.
     in_scattered : tuple of two (3,) float64
         See `in_scattered_shares`.
-    mirrored : float
-        Fraction of forward-scattered light that the interface mirrors, where it is not known which surface.
     behind : EnvironmentAhead, optional
         What forward scattering leaves of the environment, in the direction in which a ray leaves the body.
     """
@@ -131,7 +128,6 @@ class DiffusionField:
     ior: float
     ahead: Array
     in_scattered: tuple[Array, Array]
-    mirrored: float = 0.0
     behind: EnvironmentAhead | None = None
 
     @cached_property
@@ -400,5 +396,4 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
         in_scattered=in_scattered_shares(
             polished.reflected, optics.transmittance(np.asarray(medium.absorption) * chord)
         ),
-        mirrored=IN_SCATTERED_REFLECTED * float(polished.reflected),
     )

@@ -7,7 +7,7 @@ from typing import get_args
 from translucent.diffusion.environment_ahead import DEPTHS, HEIGHT, WIDTH
 from translucent.formulas.bsdf import TABLE_SIZE
 from translucent.formulas.color import LUMINANCE_WEIGHTS
-from translucent.formulas.diffusion import AZIMUTHS, IN_SCATTERED_ROUGHNESS, LEAST_COSINE
+from translucent.formulas.diffusion import AHEAD_ANGLE, AZIMUTHS, IN_SCATTERED_ROUGHNESS, LEAST_COSINE
 from translucent.formulas.interface import CLEARCOAT_IOR
 from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
 from translucent.formulas.sampling import ALPHA_OF_DEVIATION, LEAST_ACROSS, LEAST_BREADTH, MOST_LOOKUPS
@@ -118,6 +118,7 @@ CONSTANTS: dict[str, str] = {
     "AHEAD_DEPTHS": f"{DEPTHS}.0",
     "AHEAD_HEIGHT": f"{HEIGHT}.0",
     "AHEAD_WIDTH": f"{WIDTH}.0",
+    "AHEAD_ANGLE": repr(AHEAD_ANGLE),
     "IN_SCATTERED_ROUGHNESS": repr(IN_SCATTERED_ROUGHNESS),
     "DENSITY_GRID": "1.0",
     "DENSITY_LINEAR": "2.0",

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from translucent.arrays import Array
 from translucent.errors import RenderError
+from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.layout import DENSITY
 from translucent.gpu.textures import unlike_powers
@@ -91,7 +92,8 @@ class DiffusedTexture:
                 "ahead": field.ahead,
                 "ahead_deepest": 0.0 if field.behind is None else field.behind.deepest * field.phase.mean_cosine,
                 "ahead_layer": self.first_layers[number] + sum(part.shape[2] for part in field.volumes[:-1]),
-                "in_scattered_mirrored": field.mirrored,
+                "inner_mirror_flux": diffuse_interface(field.ior).reflected_flux,
+                "ahead_cosine": field.phase.mean_cosine,
                 "in_scattered_far": field.in_scattered[0].astype(np.float32),
                 "in_scattered_near": field.in_scattered[1].astype(np.float32),
             }

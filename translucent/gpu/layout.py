@@ -427,7 +427,8 @@ OBJECT_ROW = PackedTable(
         ("in_scattered_far", "f4", (3,)),  # of that light, when mirrored: fraction that leaves where a ray does,
         ("ahead_deepest", "f4", ()),  # depth of such events at the last layer; 0 for no layers
         ("in_scattered_near", "f4", (3,)),  # and on the other side
-        ("in_scattered_mirrored", "f4", ()),  # fraction that is mirrored, where the surface is not known
+        ("inner_mirror_flux", "f4", ()),  # fraction of light as the cosine that its interface reflects from inside
+        ("ahead_cosine", "f4", ()),  # mean cosine of scattering
     ),
 )
 

@@ -189,7 +189,8 @@ _NO_DIFFUSION: Fields = {
     "ahead": 0.0,
     "ahead_layer": 0.0,
     "ahead_deepest": 0.0,
-    "in_scattered_mirrored": 0.0,
+    "inner_mirror_flux": 0.0,
+    "ahead_cosine": 0.0,
     "in_scattered_far": 0.0,
     "in_scattered_near": 0.0,
 }
