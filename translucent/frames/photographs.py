@@ -236,9 +236,7 @@ def _photograph(table: dict[str, Any], what_for: str, path: Path, unit: str) -> 
     wrong = sorted(table.keys() ^ {"file", "white", "patches"})
     if wrong:
         found = "is missing" if wrong[0] in ("file", "white", "patches") else "is not known"
-        raise InputError(
-            what_for, f"{wrong[0]!r} {found}", "each photograph needs the keys 'file', 'white', 'patches'"
-        )
+        raise InputError(what_for, f"{wrong[0]!r} {found}", "each photograph needs the keys 'file', 'white', 'patches'")
     file, white, patches = table["file"], table["white"], table["patches"]
     texts = [file, white, *patches] if isinstance(patches, list) else [None]
     if not all(isinstance(text, str) for text in texts):
