@@ -356,7 +356,7 @@ def test_color_of_a_medium_that_scatters(
     assert page.locator("#roughness").is_disabled()
     albedos = page.evaluate("({ error: viewer.page.albedos.error, found: viewer.state().media[0].albedo })")
     assert page.locator(".albedo-error").inner_text() == f"of thick parts, within {100 * albedos['error']:.2g} %"
-    # Three quarters of it come from the cells of this grid, of which a page keeps every other one: with all it is .008.
+    # A page stores every second cell of the grid. This causes three quarters of the error: with all cells, it is .008.
     assert albedos["error"] < 0.035
     found = np.array(albedos["found"])
     color = [half_space_reflectance(float(one), wax.ior) for one in found]

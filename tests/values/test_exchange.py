@@ -92,7 +92,7 @@ def test_the_light_of_a_ball_on_a_ground() -> None:
 
 
 def test_bodies_on_a_ground_hide_each_other() -> None:
-    """What is in the shadow of a ball from all points of a ground neither lights these nor takes any of their light."""
+    """A surface that a ball hides from every point of the ground exchanges no light with the ground."""
     outer, inner = Sphere(radius=0.5).tessellate(24), Sphere(radius=0.3).tessellate(24)
     dark = tl.Medium(absorption=300.0, scattering=30.0)
     cover = tl.Object(outer, dark)

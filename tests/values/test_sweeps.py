@@ -104,7 +104,7 @@ def test_light_gets_as_far_as_it_does(depth: float) -> None:
 
 
 def test_moment_functions_add_up_to_legendre_polynomials() -> None:
-    """Of the cosine between two directions, for each order."""
+    """Legendre polynomials of the cosine between two directions, one per order."""
     one, other = even_directions(48), even_directions(30)
     products = moment_functions(one)[:, :, None] * moment_functions(other)[:, None, :]
     cosine = one @ other.T

@@ -43,7 +43,7 @@ def mitsuba_scene(
 
 
 def lacking_in_mitsuba(made: Scene) -> str:
-    """What Mitsuba has no words for in a scene; empty if nothing."""
+    """Name the feature of a scene that Mitsuba cannot represent; empty if Mitsuba represents all features."""
     return next((found for part in _parts(made) for found, _ in beyond_mitsuba(part)), "")
 
 

@@ -55,7 +55,7 @@ def uniform_scale(transform: npt.ArrayLike) -> float:
 
 @checked
 def patterned(mesh: Mesh, surface: Surface | None, name: str, scale: float = 1.0) -> tuple[Mesh, Surface | None]:
-    """Mesh and surface with a pattern; without one, and where the surface has textures, those that are given.
+    """Apply a pattern to a mesh and its surface, unless the surface has textures of its own.
 
     Parameters
     ----------
