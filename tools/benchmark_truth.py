@@ -13,9 +13,11 @@ with standard errors. ``--larger N`` writes pictures of N times the width and he
 from __future__ import annotations
 
 import importlib
+import json
 import sys
 import time
 import warnings
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -23,20 +25,22 @@ import click
 import numpy as np
 
 import translucent as tl
+from translucent import reference
+from translucent.arrays import Array, Mask
 from translucent.bench.truth import scene_parameters
-from translucent.benchmark.nesting import mitsuba_scene
+from translucent.benchmark.export import mitsuba_scene
 from translucent.benchmark.scenes import SCENES, BenchmarkScene, scene_named
 from translucent.benchmark.truth import (
     TruthAgreement,
     TruthPicture,
     TruthRecord,
     agreement_with,
-    geometry_truth,
     read_records,
     stored_truth_of,
     truth_path,
-    write_records,
 )
+from translucent.files.paths import write_text_atomically
+from translucent.frames.metrics import interior
 
 #: Noise of a half that is wanted: of clear scenes, and of those that scatter.
 WANTED, WANTED_SCATTERING = 0.028, 0.076
@@ -148,6 +152,39 @@ def is_current(scene: BenchmarkScene) -> bool:
     except tl.InputError:
         return False
     return True
+
+
+def geometry_truth(scene: BenchmarkScene) -> tuple[Mask, Array | None]:
+    """Pixels that show something of a scene, and thickness in metres where it is defined; by the reference, float64."""
+    made, size = scene.make(), scene.size
+    counts = reference.hit_counts(made, size)
+    opaque = reference.opaque_counts(made, size)
+    mask = counts > 0
+    away = interior(counts)
+    for found in opaque:
+        mask |= found > 0
+        away &= interior(found)
+    if not scene.thickness:
+        return mask, None
+    frame = reference.render(made, size, bounces=1)
+    return mask, np.where(away & frame.valid, frame.thickness, np.nan).astype(np.float32)
+
+
+def write_records(records: dict[str, TruthRecord]) -> None:
+    """Write the records of all stored truths."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: plain(one) for key, one in value.items()}
+        if isinstance(value, list | tuple):
+            return [plain(one) for one in value]
+        return float(f"{value:.4g}") if isinstance(value, float) else value
+
+    ordered = {name: plain(asdict(records[name])) for name in sorted(records)}
+    text = json.dumps(ordered, indent=1).replace("NaN", "null") + "\n"
+    path = truth_path("x").with_name("agreement.json")
+    path.parent.mkdir(exist_ok=True)
+    write_text_atomically(path, text)
 
 
 @click.command()

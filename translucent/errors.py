@@ -99,6 +99,12 @@ def close_names(written: str, known: Iterable[str]) -> list[str]:
     return list(dict.fromkeys([*misspelled, *sorted(parts, key=len)]))[:MOST]
 
 
+def closest_name(written: str, known: Iterable[str], otherwise: str) -> str:
+    """The question "did you mean ...?" for the closest known name, or else what is to be done."""
+    close = get_close_matches(written, list(known), n=1)
+    return did_you_mean(close) if close else otherwise
+
+
 def did_you_mean(names: Iterable[str]) -> str:
     """The question "did you mean ...?" for one or more names."""
     *others, last = names

@@ -16,9 +16,8 @@ from click.testing import CliRunner
 import translucent as tl
 from tests.benchmark.lambert import render
 from translucent.benchmark.adapters import ALL, Adapter, Session, run_adapter
-from translucent.benchmark.export import corner_thickness, divided, export_scene
+from translucent.benchmark.export import corner_thickness, divided, export_scene, lacking_in_mitsuba, mitsuba_scene
 from translucent.benchmark.measures import _zoomed, score_picture, score_thickness, suspicions
-from translucent.benchmark.nesting import lacking_in_mitsuba, mitsuba_scene
 from translucent.benchmark.page import write_benchmark_page
 from translucent.benchmark.results import Results, SceneResult, merge, read_results, safe_name, unpacked
 from translucent.benchmark.scenes import FEATURES, SCENES, promise_kept, scene_named

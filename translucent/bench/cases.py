@@ -12,11 +12,20 @@ from pathlib import Path
 import numpy as np
 
 from translucent import reference
-from translucent.bench import lit_together as lit
 from translucent.bench.contenders import Effect
 from translucent.bench.drawing import Size
 from translucent.bench.record import MODEL_CASE
-from translucent.bench.shapes import lens_row, lying_torus, menger_sponge, nested_shells, placed, subdivided, toolkit
+from translucent.bench.shapes import (
+    bent_leaf,
+    lens_row,
+    lying_torus,
+    menger_sponge,
+    nested_shells,
+    placed,
+    square_ground,
+    subdivided,
+    toolkit,
+)
 from translucent.errors import InputError, printable
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Sphere, SphericalShell, Torus
@@ -29,6 +38,7 @@ from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Light, Object, Overlap, Scene
 from translucent.scene.showcase import framing, showcase
 from translucent.scene.surface import Surface
+from translucent.scene.texture import Texture
 
 #: Distance of a far body, in its own diameters.
 FAR = 1e4
@@ -42,6 +52,18 @@ DUSK = Environment.constant((0.02, 0.02, 0.025))
 #: A sky brighter and bluer than the ground: smooth, so that few paths estimate it; and at dusk, beside a light.
 SKY = Environment.gradient((0.22, 0.19, 0.16), (1.25, 1.4, 1.6))
 EVENING = Environment.gradient((0.05, 0.045, 0.04), (0.1, 0.11, 0.13))
+
+#: Skies: bright and dim, above a ground, and behind a leaf.
+DAY = Environment.gradient((0.3, 0.28, 0.25), (1.1, 1.2, 1.4))
+DIM_DAY = Environment.gradient((0.1, 0.1, 0.1), (0.3, 0.33, 0.4))
+BACKLIT = Environment.gradient((2.0, 1.8, 1.5), (0.2, 0.25, 0.3))
+
+#: Colors of a ground, and of the squares of a cube.
+GREY, WHITE = (0.55, 0.52, 0.48), (0.85, 0.85, 0.85)
+DARK, LIGHT = (0.05, 0.08, 0.3), (0.9, 0.85, 0.6)
+
+WAX = Medium((0.05, 0.12, 0.35), (7.0, 6.5, 5.5), anisotropy=0.3, ior=1.44)
+GLASS = Medium((0.05, 0.02, 0.04), ior=1.5)
 
 #: A model is no solid if the reference can trust less than this fraction of the pixels that it covers ...
 LEAST_VALID = 0.5
@@ -92,11 +114,6 @@ class Case:
     paths: int = 0
     by_opengl: bool = False
     stored: bool = True
-
-
-def _sizeless(make: Callable[[], Scene]) -> Callable[[Size], Scene]:
-    """Scene that is the same for pictures of all sizes."""
-    return lambda _: make()
 
 
 def _body(make: Callable[[], Mesh], size: Size) -> Scene:
@@ -253,6 +270,98 @@ def _lantern(_: Size) -> Scene:
     return _scene(Object(shell, _milky(2.5, 0.2, (0.99, 0.99, 0.99), 1.0)), [light], EVENING)
 
 
+# Scenes in which light travels between objects. Their truth is made of random paths (`PathTraced`), which agree with
+# Mitsuba 3 on such scenes.
+
+
+def _on_top(radius: float = 1.0, center: Sequence[float] = (0.0, 1.01, 0.0)) -> Mesh:
+    """Ball, by default on the ground."""
+    return Sphere(radius=radius, center=(center[0], center[1], center[2])).tessellate(48)
+
+
+def _together(
+    objects: Sequence[Object], lights: Sequence[Light] = (), environment: Environment = DAY, overlap: Overlap = "add"
+) -> Scene:
+    """Objects of about two metres, from the front, a little to the side and above."""
+    camera = Camera.look_at((0.5, 1.8, 4.8), (0.0, 0.95, 0.0), fov_y=32.0)
+    shadows = 64 if any(item.medium is None for item in objects) else 0
+    return Scene(list(objects), camera, lights, environment, overlap, environment_shadows=shadows)
+
+
+def _wax_on_white(_: Size) -> Scene:
+    """Ball of wax on a white ground under a sky."""
+    return _together([Object(_on_top(), WAX), square_ground(WHITE)])
+
+
+def _matched_wax_in_the_sun(_: Size) -> Scene:
+    """Ball of wax without an interface on a gray ground, in the sun."""
+    sun = DirectionalLight((-0.5, -0.7, -0.45), 3.0)
+    medium = Medium(WAX.absorption, WAX.scattering, anisotropy=0.3)
+    return _together([Object(_on_top(), medium), square_ground(GREY)], [sun], DIM_DAY)
+
+
+def _fog_ahead(_: Size) -> Scene:
+    """Ball of fog before the sun, six mean free paths thick."""
+    fog = Medium((0.03,) * 3, (2.97,) * 3, anisotropy=0.85)
+    return _together([Object(_on_top(), fog)], [DirectionalLight((0.25, -0.2, 1.0), 3.0)], DIM_DAY)
+
+
+def _ball_in_soap(_: Size) -> Scene:
+    """Red ball inside a ball of soap."""
+    soap = Medium((0.03, 0.05, 0.12), (2.6, 2.4, 2.0), anisotropy=0.4, ior=1.45)
+    core = Object(_on_top(0.45, (0.1, 1.05, 0.25)), color=(0.75, 0.08, 0.05))
+    return _together([Object(_on_top(), soap), core])
+
+
+def _neon(_: Size) -> Scene:
+    """Ring that emits, absorbs, scatters and refracts light."""
+    medium = Medium((0.8, 0.5, 0.3), (1.2, 1.4, 1.8), (0.9, 0.35, 0.1), anisotropy=0.2, ior=1.4)
+    camera = Camera.look_at((0.5, 2.2, 3.0), (0.0, 0.0, 0.0), fov_y=36.0)
+    return Scene([Object(Torus(0.8, 0.3).tessellate(48), medium)], camera, (), DIM_DAY)
+
+
+def _squared_cube(half: float, center: Sequence[float]) -> Object:
+    """Cube with a texture of four by four squares on each face."""
+    points, uv = [], []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            out, across, up = (np.roll(np.eye(3), -axis, axis=0)[i] for i in range(3))
+            for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)) if side > 0 else ((-1, -1), (-1, 1), (1, 1), (1, -1)):
+                points.append(half * (side * out + a * across + b * up) + center)
+                uv.append((0.5 + 0.5 * a, 0.5 + 0.5 * b))
+    faces = [(4 * i, 4 * i + j, 4 * i + j + 1) for i in range(6) for j in (1, 2)]
+    square = np.arange(64) // 16
+    pixels = np.where((square[:, None] + square) % 2 == 0, 0.0, 1.0)[..., None] * np.subtract(LIGHT, DARK) + DARK
+    surface = Surface(color_texture=Texture(pixels.astype(np.float32)), ior=1.0, roughness=1.0)
+    return Object(
+        Mesh(np.array(points), np.array(faces, dtype=np.int32), uv=np.array(uv), name="cube"), surface=surface
+    )
+
+
+def _cubes_in_and_behind_glass(_: Size) -> Scene:
+    """Checkered cubes inside and behind a ball of glass."""
+    cubes = _squared_cube(0.42, (0.0, 1.0, 0.0)), _squared_cube(0.6, (-0.6, 0.95, -2.2))
+    return _together([Object(_on_top(), GLASS), *cubes, square_ground(GREY, -0.05)])
+
+
+def _in_a_shell(*inner: Object) -> Scene:
+    shell = placed(SphericalShell(1.0, 0.8).tessellate(48), GLASS, (0.0, 1.01, 0.0), priority=2)
+    return _together([*inner, shell, square_ground(GREY)], overlap="priority")
+
+
+def _ice_in_a_drink(_: Size) -> Scene:
+    """Ice in a drink in a round glass, whose walls touch."""
+    drink, ice = Medium((0.3, 0.9, 2.0), ior=1.34), Medium((0.1, 0.1, 0.1), ior=1.31)
+    inner = Object(_on_top(0.8), drink, priority=1), Object(_on_top(0.35, (0.1, 1.2, 0.1)), ice, priority=3)
+    return _in_a_shell(*inner)
+
+
+def _milk_in_a_glass(_: Size) -> Scene:
+    """Milk in a round glass, whose walls touch."""
+    milk = Medium((0.005, 0.01, 0.03), (5.0, 5.5, 6.0), anisotropy=0.7, ior=1.34)
+    return _in_a_shell(Object(_on_top(0.8), milk, priority=1))
+
+
 #: Cases by effect: those of interfaces take long, and all but one are left out by ``--quick``. Those of light that is
 #: scattered many times have a stored truth, and lights before bodies without interfaces alone: light that a polished
 #: interface bends is found by no path.
@@ -385,45 +494,49 @@ CASES: tuple[Case, ...] = (
         compared=32,
         paths=550,
     ),
-    _lit(
-        "wax on white", "Wax on a white ground", "light that goes between both", _sizeless(lit.wax_on_white), paths=250
-    ),
+    _lit("wax on white", "Wax on a white ground", "light that goes between both", _wax_on_white, paths=250),
     _lit(
         "matched wax in the sun",
         "Wax without an interface in the sun",
         "its own shadow, and light of the ground",
-        _sizeless(lit.matched_wax_in_the_sun),
+        _matched_wax_in_the_sun,
         paths=300,
     ),
-    _lit("fog ahead", "Fog before the sun", "nearly all light goes on ahead", _sizeless(lit.fog_ahead), paths=1500),
-    _lit("thin leaf", "Leaf before the sky", "thinner than a cell of a grid", _sizeless(lit.leaf), paths=400),
+    _lit("fog ahead", "Fog before the sun", "nearly all light goes on ahead", _fog_ahead, paths=1500),
+    _lit(
+        "thin leaf",
+        "Leaf before the sky",
+        "thinner than a cell of a grid",
+        lambda _: bent_leaf(BACKLIT),
+        paths=400,
+    ),
     _lit(
         "ball in soap",
         "Red ball in soap",
         "it takes light out of the soap around it",
-        _sizeless(lit.ball_in_soap),
+        _ball_in_soap,
         paths=500,
     ),
-    _lit("neon", "Ring that glows", "its light is scattered and mirrored inside", _sizeless(lit.neon), paths=400),
+    _lit("neon", "Ring that glows", "its light is scattered and mirrored inside", _neon, paths=400),
     _lit(
         "cubes in and behind glass",
         "Checkered cubes in and behind glass",
         "textures behind interfaces",
-        _sizeless(lit.cubes_in_and_behind_glass),
+        _cubes_in_and_behind_glass,
         paths=500,
     ),
     _lit(
         "ice in a drink",
         "Ice in a drink in a glass",
         "three media and five interfaces",
-        _sizeless(lit.ice_in_a_drink),
+        _ice_in_a_drink,
         paths=500,
     ),
     _lit(
         "milk in a glass",
         "Milk in a glass",
         "light that diffuses behind a wall",
-        _sizeless(lit.milk_in_a_glass),
+        _milk_in_a_glass,
         paths=300,
     ),
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -15,7 +14,7 @@ from translucent import reference
 from translucent.bench.drawing import BenchContext, Drawing, FrameDrawing, PlanDrawing, ShortcutDrawing, Size
 from translucent.bench.engines import Engine, Frostbite, NormalizedDiffusion, PaintLayer, visible_points
 from translucent.bench.record import Quantity, RowKind
-from translucent.errors import InputError
+from translucent.errors import InputError, closest_name
 from translucent.frames.frame import Frame
 from translucent.gpu.passes.shortcuts import HalfFloatPass, NearestFace, NearestFacePass, Shortcut, UnmarkedBackFacePass
 from translucent.gpu.targets import Targets
@@ -516,9 +515,8 @@ def check_names(names: Iterable[str]) -> None:
     known = {_slug(text) for one in CONTENDERS for text in (one.name, one.family)}
     for name in names:
         if _slug(name) not in known:
-            close = difflib.get_close_matches(_slug(name), sorted(known), n=1)
             families = sorted({_slug(one.family) for one in CONTENDERS})
-            do = f"did you mean {close[0]}?" if close else f"use some of {', '.join(families)}"
+            do = closest_name(_slug(name), sorted(known), f"use some of {', '.join(families)}")
             raise InputError(f"method {name!r}", "the report does not measure this method", do)
 
 

@@ -14,7 +14,9 @@ from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Ellipsoid, Sphere, Torus
 from translucent.media.medium import Medium
 from translucent.mesh_files import load_mesh
-from translucent.scene.scene import Object
+from translucent.scene.camera import Camera
+from translucent.scene.environment import Environment
+from translucent.scene.scene import Object, Scene
 from translucent.threads import import_trimesh
 
 Vertices = npt.NDArray[np.float64]
@@ -31,6 +33,22 @@ def placed(mesh: Mesh, medium: Medium | None, place: Sequence[float], **more: An
 def across(mesh: Mesh, *depths: float) -> npt.NDArray[np.float64]:
     """Coefficients of a medium, in 1/m, with these optical depths across the diagonal of a mesh."""
     return np.array(depths) / mesh.diagonal
+
+
+def square_ground(color: Sequence[float], height: float = 0.0) -> Object:
+    """A flat opaque square of 8 m by 8 m."""
+    corners = np.array([(-4, height, -4), (-4, height, 4), (4, height, 4), (4, height, -4)], dtype=np.float64)
+    return Object(Mesh(corners, np.array([(0, 1, 2), (0, 2, 3)], np.int32), name="ground"), color=tuple(color))
+
+
+def bent_leaf(sky: Environment) -> Scene:
+    """A bent leaf before a sky, three mean free paths thick in the middle."""
+    ball = Sphere().tessellate(64)
+    x, y, z = ball.vertices.T
+    vertices = np.stack([0.6 * x, 0.015 * y + 0.18 * np.sin(1.2 * x) + 0.12 * z, z], axis=1)
+    medium = Medium((8.0, 2.0, 16.0), (100.0, 110.0, 80.0), anisotropy=0.4)
+    camera = Camera.look_at((0.6, 1.9, 2.6), (0.0, 0.0, 0.0), fov_y=36.0)
+    return Scene([Object(Mesh(vertices, ball.faces, name="leaf"), medium)], camera, (), sky)
 
 
 def toolkit(name: str) -> Mesh:

@@ -23,8 +23,6 @@ from translucent.bench.record import ColorDifference, ErrorStatistics, LightErro
 from translucent.errors import InputError
 from translucent.frames.frame import Frame
 from translucent.frames.metrics import compare, interior
-from translucent.planning.methods import PathTraced
-from translucent.renderer import Renderer
 from translucent.scene.lights import DirectionalLight, SpotLight
 from translucent.scene.scene import Scene
 
@@ -316,18 +314,6 @@ class StoredTruth:
         error = 0.5 * np.sqrt(sum(spread[mask] ** 2 for _, spread in found))
         return cls(halves, error, mask, scene_parameters(scene), 2 * paths, seconds)
 
-    @classmethod
-    def by_opengl(cls, renderer: Renderer, scene: Scene, size: Size, paths: int) -> StoredTruth:
-        """Path trace two independent halves of a scene by `PathTraced` on the GPU."""
-        began = time.perf_counter()
-        found = [renderer.render(scene, size, PathTraced(paths, seed)) for seed in (1, 2)]
-        seconds = time.perf_counter() - began
-        mask = reference.path_trace(scene, size, paths=2, max_events=0)[0].coverage
-        halves = np.stack([frame.radiance[mask].astype(np.float64) for frame in found])
-        spreads = [frame.standard_error for frame in found]
-        error = 0.5 * np.sqrt(sum(spread[mask].astype(np.float64) ** 2 for spread in spreads if spread is not None))
-        return cls(halves, error, mask, scene_parameters(scene), 2 * paths, seconds)
-
     @property
     def noise(self) -> float:
         """Root mean square of the standard error, as a fraction of the mean radiance."""
@@ -377,14 +363,15 @@ def stored_truth(name: str, scene: Scene) -> StoredTruth:
             f"truth of {name!r}", "no true picture of this scene is stored", "run tools/scattering_truth.py"
         )
     truth = StoredTruth.from_bytes(file.read_bytes())
-    now = scene_parameters(scene)
-    if now.shape != truth.parameters.shape or not np.allclose(now, truth.parameters, SAME, SAME_ZERO):
-        raise InputError(
-            f"truth of {name!r}",
-            "the scene has changed since its true picture was path traced",
-            "run tools/scattering_truth.py",
-        )
+    require_same_scene(name, scene, truth.parameters, "run tools/scattering_truth.py", SAME, SAME_ZERO)
     return truth
+
+
+def require_same_scene(name: str, scene: Scene, stored: Array, do: str, relative: float, absolute: float) -> None:
+    """Raise `InputError` if the parameters of a scene are not those whose truth is stored, up to rounding."""
+    now = scene_parameters(scene)
+    if now.shape != stored.shape or not np.allclose(now, stored, relative, absolute):
+        raise InputError(f"truth of {name!r}", "the scene has changed since its true picture was path traced", do)
 
 
 def scene_parameters(scene: Scene) -> Array:

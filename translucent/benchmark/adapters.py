@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import importlib.util
 import json
 import math
@@ -27,8 +26,7 @@ import numpy.typing as npt
 
 from translucent.bench.experiment import one_line
 from translucent.benchmark.browser import BABYLON, FILAMENT, MODEL_VIEWER, THREE, WebRenderer, open_page
-from translucent.benchmark.export import export_scene, mean_chord
-from translucent.benchmark.nesting import lacking_in_mitsuba, mitsuba_scene
+from translucent.benchmark.export import export_scene, lacking_in_mitsuba, mean_chord, mitsuba_scene
 from translucent.benchmark.results import (
     Results,
     SceneResult,
@@ -41,7 +39,7 @@ from translucent.benchmark.results import (
     write_thickness,
 )
 from translucent.benchmark.scenes import FEATURES, BenchmarkScene, Feature
-from translucent.errors import InputError, RenderError
+from translucent.errors import InputError, RenderError, closest_name
 from translucent.files.images import read_exr
 from translucent.files.paths import make_folder
 from translucent.interop.pyrender import load_pyrender
@@ -511,6 +509,5 @@ def adapter_named(name: str) -> Adapter:
     known = adapters()
     if name in known:
         return known[name]
-    close = difflib.get_close_matches(name, known, n=1)
-    do = f"did you mean {close[0]}?" if close else f"use some of {', '.join(known)}"
+    do = closest_name(name, known, f"use some of {', '.join(known)}")
     raise InputError(f"adapter {name!r}", "not known", do)

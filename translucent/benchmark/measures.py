@@ -15,6 +15,7 @@ from translucent.bench.truth import bias, block_error, noise_free_square
 from translucent.benchmark.truth import TruthPicture
 from translucent.errors import RenderError
 from translucent.extras import require_package
+from translucent.formulas.color import linear_to_srgb, srgb_to_linear
 
 #: nRMSE below which a picture is near enough, so that nothing is suspected.
 NEAR = 0.06
@@ -164,17 +165,6 @@ class _Suspect:
     within: tuple[float, float] = field(default=(-math.inf, math.inf))
 
 
-def _to_linear(picture: Array) -> Array:
-    value = np.clip(picture, 0.0, None)
-    with np.errstate(over="ignore"):
-        return np.asarray(np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4))
-
-
-def _to_srgb(picture: Array) -> Array:
-    value = np.clip(picture, 0.0, None)
-    return np.asarray(np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055))
-
-
 def _zoomed(picture: Array, factor: float) -> Array:
     """The picture, enlarged about its center; what lies outside repeats the edge."""
     h, w = picture.shape[:2]
@@ -204,8 +194,13 @@ _SUSPECTS = (
     _Suspect("mirrored left to right", lambda p: p[:, ::-1]),
     _Suspect("rotated by 180 degrees", lambda p: p[::-1, ::-1]),
     _Suspect("red and blue are exchanged", lambda p: p[..., ::-1]),
-    _Suspect("sRGB-encoded, not linear: save radiance without a transfer function", _to_linear),
-    _Suspect("decoded from sRGB although the values were already linear", _to_srgb),
+    _Suspect(
+        "sRGB-encoded, not linear: save radiance without a transfer function",
+        lambda p: srgb_to_linear(np.clip(p, 0.0, 1e30)),
+    ),
+    _Suspect(
+        "decoded from sRGB although the values were already linear", lambda p: linear_to_srgb(np.clip(p, 0.0, 1e30))
+    ),
 )
 
 

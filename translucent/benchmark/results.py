@@ -7,7 +7,6 @@ they are shown, and numbers are checked.
 from __future__ import annotations
 
 import dataclasses
-import io
 import json
 import math
 import os
@@ -19,7 +18,6 @@ import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -358,21 +356,15 @@ def safe_name(name: str) -> str:
 
 def pack(folder: Path, path: Path) -> None:
     """Write results.json and pictures of a folder as one .zip file."""
+
+    def fill(part: Path) -> None:
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+            for one in sorted(folder.iterdir()):
+                if one.is_file() and _is_ours(one.name):
+                    archive.write(one, one.name)
+
     with OutputFiles() as written:
-        written.write(path, partial(_fill, _packed(folder)))
-
-
-def _fill(data: bytes, path: Path) -> None:
-    path.write_bytes(data)
-
-
-def _packed(folder: Path) -> bytes:
-    stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
-        for path in sorted(folder.iterdir()):
-            if path.is_file() and _is_ours(path.name):
-                archive.write(path, path.name)
-    return stream.getvalue()
+        written.write(path, fill)
 
 
 def _is_ours(name: str) -> bool:

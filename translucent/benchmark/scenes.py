@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -11,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from translucent.arrays import Array
-from translucent.bench.shapes import placed, toolkit
-from translucent.errors import InputError
+from translucent.bench.shapes import bent_leaf, placed, square_ground, toolkit
+from translucent.errors import InputError, closest_name
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box, Ellipsoid, Sphere, SphericalShell, Torus
 from translucent.media.albedo import scattering_medium
@@ -50,6 +49,7 @@ FEATURES: dict[Feature, str] = {
 WHITE = Environment.constant((1.0, 1.0, 1.0))
 DAY = Environment.gradient((0.3, 0.28, 0.25), (1.1, 1.2, 1.4))
 DUSK = Environment.gradient((0.1, 0.1, 0.1), (0.3, 0.33, 0.4))
+BACKLIT = Environment.gradient((1.0, 0.9, 0.75), (0.1, 0.12, 0.15))
 
 #: Refracting glass, and colors of grounds.
 GLASS_IOR = 1.5
@@ -109,10 +109,8 @@ def _on_ground(
     overlap: Overlap = "add",
 ) -> Scene:
     """Objects of about two metres on a square of eight metres."""
-    corners = np.array([(-4, 0, -4), (-4, 0, 4), (4, 0, 4), (4, 0, -4)], dtype=np.float64)
-    ground = Object(Mesh(corners, np.array([(0, 1, 2), (0, 2, 3)], np.int32), name="ground"), color=tuple(color))
     camera = Camera.look_at((0.5, 2.2, 5.0), (0.0, 0.8, 0.0), fov_y=34.0)
-    return Scene([*objects, ground], camera, lights, environment, overlap, environment_shadows=64)
+    return Scene([*objects, square_ground(color)], camera, lights, environment, overlap, environment_shadows=64)
 
 
 def _ball(radius: float = 1.0, center: Sequence[float] = (0.0, 0.0, 0.0), segments: int = 48) -> Mesh:
@@ -328,16 +326,6 @@ def _wax_and_lamp() -> Scene:
     return Scene(scene.objects, scene.camera, [lamp], DUSK)
 
 
-def _leaf() -> Scene:
-    ball = Sphere().tessellate(64)
-    x, y, z = ball.vertices.T
-    vertices = np.stack([0.6 * x, 0.015 * y + 0.18 * np.sin(1.2 * x) + 0.12 * z, z], axis=1)
-    medium = Medium((8.0, 2.0, 16.0), (100.0, 110.0, 80.0), anisotropy=0.4)
-    camera = Camera.look_at((0.6, 1.9, 2.6), (0.0, 0.0, 0.0), fov_y=36.0)
-    sky = Environment.gradient((1.0, 0.9, 0.75), (0.1, 0.12, 0.15))
-    return Scene([Object(Mesh(vertices, ball.faces, name="leaf"), medium)], camera, (), sky)
-
-
 def _fog_ahead() -> Scene:
     fog = Medium((0.03,) * 3, (2.97,) * 3, anisotropy=0.85)
     scene = _framed([Object(_ball(), fog)], DUSK)
@@ -434,7 +422,7 @@ SCENES: tuple[BenchmarkScene, ...] = (
         _milk_in_a_glass,
     ),
     _one("wax-lamp", "Wax and a lamp", "a lamp behind a bear, no interface", "scattering", _FOGGY, _wax_and_lamp),
-    _one("leaf", "Leaf", "a thin body against the light", "scattering", _FOGGY, _leaf),
+    _one("leaf", "Leaf", "a thin body against the light", "scattering", _FOGGY, lambda: bent_leaf(BACKLIT)),
     _one("fog-ahead", "Fog before the sun", "scattering ahead, g = 0.85", "scattering", _FOGGY, _fog_ahead),
     _one(
         "colored-shadow",
@@ -491,6 +479,5 @@ def scene_named(name: str) -> BenchmarkScene:
     for scene in SCENES:
         if scene.name == name:
             return scene
-    close = difflib.get_close_matches(name, scene_names(), n=1)
-    do = f"did you mean {close[0]}?" if close else "see `translucent benchmark list`"
+    do = closest_name(name, scene_names(), "see `translucent benchmark list`")
     raise InputError(f"scene {name!r}", "the benchmark has no scene of this name", do)

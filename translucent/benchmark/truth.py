@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -12,14 +12,12 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from translucent import reference
 from translucent.arrays import Array, Mask
-from translucent.bench.truth import scene_parameters
+from translucent.bench.truth import require_same_scene
 from translucent.benchmark.scenes import BenchmarkScene
 from translucent.errors import InputError
 from translucent.files.images import read_exr, write_exr
-from translucent.files.paths import write_atomically, write_text_atomically
-from translucent.frames.metrics import interior
+from translucent.files.paths import write_atomically
 
 #: Relative and absolute difference of parameters up to which a scene is the one whose truth is stored: rounding.
 SAME, SAME_ZERO = 1e-5, 1e-8
@@ -110,26 +108,8 @@ def stored_truth_of(scene: BenchmarkScene) -> TruthPicture:
     if not path.is_file():
         raise InputError(f"truth of {scene.name!r}", "no true picture of this scene is stored", DO)
     truth = TruthPicture.read(path)
-    now = scene_parameters(scene.make())
-    if now.shape != truth.parameters.shape or not np.allclose(now, truth.parameters, SAME, SAME_ZERO):
-        raise InputError(f"truth of {scene.name!r}", "the scene has changed since its true picture was rendered", DO)
+    require_same_scene(scene.name, scene.make(), truth.parameters, DO, SAME, SAME_ZERO)
     return truth
-
-
-def geometry_truth(scene: BenchmarkScene) -> tuple[Mask, Array | None]:
-    """Pixels that show something of a scene, and thickness in metres where it is defined; by the reference, float64."""
-    made, size = scene.make(), scene.size
-    counts = reference.hit_counts(made, size)
-    opaque = reference.opaque_counts(made, size)
-    mask = counts > 0
-    away = interior(counts)
-    for found in opaque:
-        mask |= found > 0
-        away &= interior(found)
-    if not scene.thickness:
-        return mask, None
-    frame = reference.render(made, size, bounces=1)
-    return mask, np.where(away & frame.valid, frame.thickness, np.nan).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -208,30 +188,13 @@ def read_records() -> dict[str, TruthRecord]:
     path = truth_path("x").with_name("agreement.json")
     if not path.is_file():
         return {}
+
+    def agreement(told: dict[str, Any]) -> TruthAgreement:
+        known: dict[str, Any] = {key: float("nan") if value is None else value for key, value in told.items()}
+        return TruthAgreement(**known)
+
     found = json.loads(path.read_text(encoding="utf-8"))
     return {
-        name: TruthRecord(**{**one, "agreements": tuple(_agreement(each) for each in one["agreements"])})
+        name: TruthRecord(**{**one, "agreements": tuple(agreement(each) for each in one["agreements"])})
         for name, one in found.items()
     }
-
-
-def _agreement(told: dict[str, Any]) -> TruthAgreement:
-    known: dict[str, Any] = {key: float("nan") if value is None else value for key, value in told.items()}
-    return TruthAgreement(**known)
-
-
-def write_records(records: dict[str, TruthRecord]) -> None:
-    """Write the records of all stored truths."""
-
-    def plain(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {key: plain(one) for key, one in value.items()}
-        if isinstance(value, list | tuple):
-            return [plain(one) for one in value]
-        return float(f"{value:.4g}") if isinstance(value, float) else value
-
-    ordered = {name: plain(asdict(records[name])) for name in sorted(records)}
-    text = json.dumps(ordered, indent=1).replace("NaN", "null") + "\n"
-    path = truth_path("x").with_name("agreement.json")
-    path.parent.mkdir(exist_ok=True)
-    write_text_atomically(path, text)

@@ -135,7 +135,7 @@ def same_file(one: Path, other: Path) -> bool:
         return False
 
 
-def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     """Let `write` fill a temporary file beside `path`, then rename it; on any failure `path` stays as it was.
 
     What a process that was killed while it wrote `path` has left beside it is removed.
@@ -164,7 +164,7 @@ class OutputFiles:
     def __enter__(self) -> Self:
         return self
 
-    def write(self, path: Path, write: Callable[[Path], None]) -> Path:
+    def write(self, path: Path, write: Callable[[Path], object]) -> Path:
         """Let `write` fill a temporary file beside `path`, as `write_atomically`; returns its path."""
         _require_replaceable(path, f"output {str(path)!r}")
         path = Path(os.path.realpath(path))  # a link stays a link, and what it points to is replaced
