@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.scene.lights import SPREADS, without_spheres
+from translucent.scene.lights import SPREADS, with_points
 from translucent.scene.stages import moved
 
 
@@ -51,7 +51,7 @@ def test_as_many_points_as_lights_are_held() -> None:
         ([sphere] * 9, 8, 9),
         ([lamp], 8, 1),
     ):
-        assert len(without_spheres(lights, most)) == found
+        assert len(with_points(lights, most)) == found
 
 
 def test_a_sphere_moves_with_its_scene() -> None:

@@ -78,7 +78,7 @@ from translucent.planning.rendered import Treatment, darkened, occluder_scene, o
 from translucent.planning.request import RenderRequest
 from translucent.planning.scattering import Scattering, SingleScattering, Treatments, choose_treatments, rendered_scene
 from translucent.planning.shadow_maps import ShadowMaps, shadow_passes, shadows_left_out
-from translucent.scene.lights import SPREADS, PositionalLight, SphereLight, SpotLight, without_spheres
+from translucent.scene.lights import SPREADS, AreaLight, PositionalLight, SpotLight, with_points
 from translucent.scene.scene import Object, Scene, check_scene, object_names
 
 
@@ -189,17 +189,17 @@ def _denoised_note(found: RenderPlan) -> Note:
 
 
 def _with_point_lights(scene: Scene, rendered: Scene) -> tuple[Scene, tuple[Note, ...]]:
-    """The scene with point lights in place of sphere lights, and notes.
+    """The scene with point lights in place of area lights, and notes.
 
     `rendered` is the scene with its treatments: lights that are followed into its media are fewer.
     """
-    spheres = sum(isinstance(light, SphereLight) for light in scene.lights)
-    if not spheres:
+    areas = [light for light in scene.lights if isinstance(light, AreaLight)]
+    if not areas:
         return scene, ()
     most = MAX_SCATTER_LIGHTS if scatters(rendered) else MAX_LIGHTS
-    lights = without_spheres(scene.lights, most)
-    count = (len(lights) - len(scene.lights)) // spheres + 1
-    text = f"each sphere light casts the shadows of {count} point lights"
+    lights = with_points(scene.lights, most)
+    count = (len(lights) - len(scene.lights)) // len(areas) + 1
+    text = f"each {areas[0].noun} casts the shadows of {count} point lights"
     if count < len(SPREADS[0]):
         where = "into media" if scatters(rendered) else "to surfaces"
         text += f", not of {len(SPREADS[0])}, because at most {most} lights can shine {where}"

@@ -162,9 +162,20 @@ class SpotLight(PositionalLight):
         return 0.5 * (within + (without - within) / 3.0)
 
 
+class AreaLight(PositionalLight):
+    """Base class of lights with a size, which are drawn as several point lights and so throw soft shadows."""
+
+    #: Name of the kind of light in messages.
+    noun = "area light"
+
+    def points(self, count: int) -> tuple[PointLight, ...]:
+        """Point lights of the same intensity in all, at most `count` of them, 1 at least."""
+        raise NotImplementedError
+
+
 @checked
 @dataclass(frozen=True, eq=False)
-class SphereLight(PositionalLight):
+class SphereLight(AreaLight):
     """Sphere that shines with the same radiance from all its points in all directions, and so throws soft shadows.
 
     It is drawn as point lights that are spread in it so that they look like an even disc from everywhere. The camera
@@ -188,6 +199,8 @@ class SphereLight(PositionalLight):
     position: npt.ArrayLike
     intensity: npt.ArrayLike
     radius: float
+
+    noun = "sphere light"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -286,12 +299,12 @@ class DirectionalLight(Frozen):
 Light = PointLight | SpotLight | SphereLight | DirectionalLight
 
 
-def without_spheres(lights: Sequence[Light], most: int) -> tuple[Light, ...]:
-    """The lights with point lights in place of each sphere light, at most `most` of them in all."""
-    spheres = sum(isinstance(light, SphereLight) for light in lights)
-    count = max((most - len(lights)) // max(spheres, 1) + 1, 1)
+def with_points(lights: Sequence[Light], most: int) -> tuple[Light, ...]:
+    """The lights with point lights in place of each area light, at most `most` of them in all."""
+    areas = sum(isinstance(light, AreaLight) for light in lights)
+    count = max((most - len(lights)) // max(areas, 1) + 1, 1)
     return tuple(
-        part for light in lights for part in (light.points(count) if isinstance(light, SphereLight) else (light,))
+        part for light in lights for part in (light.points(count) if isinstance(light, AreaLight) else (light,))
     )
 
 
