@@ -1,9 +1,9 @@
 // One photon; blending adds them up.
 
-flat in vec3 irradiance;
+flat in vec4 irradiance;
 
 layout(location = 0) out vec4 out_irradiance;
 
 void main() {
-    out_irradiance = vec4(irradiance, 1.0);
+    out_irradiance = irradiance;
 }

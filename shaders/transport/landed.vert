@@ -1,5 +1,6 @@
 // Photons as points of the picture, where it shows the surfaces on which they have landed. What each adds to the irradiance
-// of its pixel is its power, over the area that the pixel covers of the plane in which it lies.
+// of its pixels is its power, over the area that a pixel covers of the plane in which it lies. Each is a
+// square half a pixel wide, in up to four pixels: even light starts on a lattice, and photons without width show its moire.
 
 #include <constants>
 #include <View>
@@ -11,7 +12,7 @@ uniform sampler2D landed_power;
 uniform sampler2D landed_normal;       // of the face, unit, to the side on which it lies
 uniform sampler2D opaque_axial_depth;
 
-flat out vec3 irradiance;
+flat out vec4 irradiance;  // a: fraction of the photon
 
 const float STEEPEST_FACE = 0.1;  // sine of the angle between faces of one curved surface within a pixel
 const vec4 NOWHERE = vec4(2.0, 2.0, 2.0, 1.0);
@@ -29,9 +30,10 @@ bool shows_plane(vec2 corner, vec3 point, vec3 normal, float along, out bool beh
 
 void main() {
     int width = textureSize(landed_point, 0).x;
-    ivec2 place = ivec2(gl_VertexID % width, gl_VertexID / width);
+    int number = gl_VertexID / 4;
+    ivec2 place = ivec2(number % width, number / width);
     gl_Position = NOWHERE;
-    irradiance = vec3(0.0);
+    irradiance = vec4(0.0);
     vec4 point = texelFetch(landed_point, place, 0);
     if (point.w != 1.0) { return; }
     vec3 normal = texelFetch(landed_normal, place, 0).xyz;
@@ -67,6 +69,14 @@ void main() {
         if (edge == corner) { return; }
         corner = edge;
     }
-    irradiance = texelFetch(landed_power, place, 0).rgb * (facing / (pixel.x * pixel.y));
+    vec2 off = projected - floor(projected) - 0.5;
+    ivec2 aside = ivec2(gl_VertexID & 1, (gl_VertexID >> 1) & 1);
+    vec2 beyond = max(2.0 * abs(off) - 0.5, 0.0);
+    vec2 part = mix(1.0 - beyond, beyond, vec2(aside));
+    // Where a pixel shows something else, that of the photon has its part.
+    vec2 other = corner + sign(off) * vec2(aside);
+    bool inside = all(greaterThanEqual(other, vec2(0.0))) && all(lessThan(other, frame_size.xy));
+    if (inside && shows_plane(other, point.xyz, normal, along, behind)) { corner = other; }
+    irradiance = part.x * part.y * vec4(texelFetch(landed_power, place, 0).rgb * (facing / (pixel.x * pixel.y)), 1.0);
     gl_Position = vec4((vec2(stored(ivec2(corner))) + 0.5) / frame_size.xy * 2.0 - 1.0, 0.0, 1.0);
 }

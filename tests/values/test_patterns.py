@@ -1,4 +1,4 @@
-"""Patterns of surfaces: veins of marble, cracks and frost of ice."""
+"""Patterns: veins of marble, bubbles of air in ice."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 
 import translucent as tl
 from translucent.errors import InputError
-from translucent.geometry.solids import Box
+from translucent.geometry.solids import Box, Torus
 from translucent.media.preset import preset_text, read_presets
 from translucent.scene.patterns import ACROSS, PATTERNS, patterned
 from translucent.scene.showcase import with_pattern
@@ -20,7 +20,8 @@ def test_a_pattern_has_a_size_in_metres_and_goes_through_the_body(name: str) -> 
     mesh, surface = patterned(BOX, None, name)
     assert mesh.uv is not None
     assert surface is not None
-    np.testing.assert_allclose(PATTERNS[name].period * mesh.uv, BOX.vertices @ ACROSS.T, rtol=1e-12)
+    np.testing.assert_array_equal(mesh.vertices[: len(BOX.vertices)], BOX.vertices)
+    np.testing.assert_allclose(PATTERNS[name].period * mesh.uv, mesh.vertices @ ACROSS.T, rtol=1e-12)
     assert patterned(BOX, None, name)[0] is mesh  # what renderers keep of it stays
     scaled = tl.Object(BOX, transform=np.diag([2.0, 2.0, 2.0, 1.0]), material="marble" if name == "veins" else "ice")
     np.testing.assert_allclose(scaled.mesh.uv, 2.0 * mesh.uv, rtol=1e-12)
@@ -34,17 +35,34 @@ def test_textures_of_a_surface_stay() -> None:
     own = tl.Surface(color_texture=tl.Texture(np.ones((1, 1, 3))))
     assert patterned(BOX, own, "veins") == (BOX, own)
     assert patterned(BOX, None, "") == (BOX, None)
-    with pytest.raises(InputError, match=r"no pattern has the name 'wood'; use one of veins, frost"):
+    with pytest.raises(InputError, match=r"no pattern has the name 'wood'; use one of veins, bubbles"):
         patterned(BOX, None, "wood")
 
 
 def test_scenes_and_presets_have_patterns() -> None:
     scene = tl.Scene([tl.Object(BOX, tl.Medium(ior=1.3)), tl.Object(BOX)], tl.Camera.framing(BOX.vertices, (8, 8)))
-    body, opaque = with_pattern(scene, "frost").objects
+    body, opaque = with_pattern(scene, "bubbles").objects
     assert body.surface is not None
-    assert body.surface.transmission_texture is not None
+    assert body.surface.normal_texture is not None
     assert opaque is scene.objects[1]
     ice = tl.preset("ice")
-    assert read_presets(preset_text(ice))["ice"].pattern == ice.summary()["pattern"] == "frost"
-    with pytest.raises(InputError, match=r'"veins" or "frost"'):
-        read_presets(preset_text(ice).replace('"frost"', '"wood"'))
+    assert read_presets(preset_text(ice))["ice"].pattern == ice.summary()["pattern"] == "bubbles"
+    with pytest.raises(InputError, match=r'"veins" or "bubbles"'):
+        read_presets(preset_text(ice).replace('"bubbles"', '"wood"'))
+
+
+def test_bubbles_are_cavities_inside_and_around_the_middle() -> None:
+    ring = Torus(0.03, 0.01).tessellate()
+    for body in (BOX, ring):
+        icy = tl.Object(body, material="ice").mesh
+        assert icy.diagnosis.solid
+        assert not icy.diagnosis.problems
+        assert len(icy.faces) - len(body.faces) > 10_000
+        assert 0.95 * body.volume < icy.volume < body.volume
+        bubbles = icy.vertices[len(body.vertices) :]
+        if body is ring:
+            assert (np.hypot(np.hypot(bubbles[:, 0], bubbles[:, 1]) - 0.03, bubbles[:, 2]) < 0.0095).all()
+        else:
+            assert ((bubbles > 0.002) & (bubbles < body.bounds[1] - 0.002)).all()
+    hole = tl.Mesh(BOX.vertices, BOX.faces[1:])  # it has no inside
+    assert len(tl.Object(hole, material="ice").mesh.faces) == len(hole.faces)

@@ -59,7 +59,7 @@ SCATTERING = {
 }
 
 #: Roughness of clear ones whose surfaces are not polished.
-ROUGH = {"frosted_glass": 0.35, "ice": 0.12}
+ROUGH = {"frosted_glass": 0.35}
 
 
 @pytest.fixture(scope="module")
@@ -162,7 +162,7 @@ def test_recipes_of_marble_and_gummy_are_these_with_another_surface_and_with_haz
     np.testing.assert_array_equal(carved.scattering, marble.scattering)
     np.testing.assert_allclose(bear.absorption, clear.absorption, rtol=1e-5)
     assert (carved.roughness, bear.medium.anisotropy, clear.medium.scatters) == (0.3, 0.8, False)
-    assert (marble.pattern, carved.pattern, tl.preset("ice").pattern) == ("veins", "", "frost")
+    assert (marble.pattern, carved.pattern, tl.preset("ice").pattern) == ("veins", "", "bubbles")
     assert bear.regime == "single scattering"
 
 

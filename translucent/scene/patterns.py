@@ -1,11 +1,15 @@
-"""Patterns of stone and ice on surfaces: textures that need no texture coordinates of the mesh.
+"""Patterns of stone and ice: textures that need no texture coordinates of the mesh, and bubbles of air in ice.
 
-A pattern is the same all along one oblique direction, as veins are sheets that cross a block. So its texture
-coordinates are linear in the position: they have no seams, and a mesh keeps its vertices. A pattern has a size in
+A texture is the same all along one oblique direction, as veins are sheets that cross a block. So its texture
+coordinates are linear in the position: they have no seams, and a mesh keeps its vertices. A texture has a size in
 metres.
 
 The textures are made from random fields whose power falls with the frequency (Saupe 1988, "Algorithms for random
-fractals", section 2.4). Veins and cracks are where such a field is 0 (after Perlin 1985, "An image synthesizer").
+fractals", section 2.4). Veins are where such a field is 0 (after Perlin 1985, "An image synthesizer").
+
+Ice freezes from outside to inside, and pushes the air of the water before it. So its rim is clear, and its middle is
+full of bubbles. Many are long, along the direction of freezing. The slower water freezes, the larger they are: they
+grow with the body (Carte 1961, "Air bubbles in ice"). Here they are cavities of the mesh.
 """
 
 from __future__ import annotations
@@ -18,11 +22,13 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arguments import checked
-from translucent.arrays import Array
+from translucent.arrays import Array, Mask
 from translucent.errors import InputError
 from translucent.geometry.mesh import Mesh
+from translucent.geometry.winding import line_crossings
 from translucent.scene.surface import Surface
 from translucent.scene.texture import Texture
+from translucent.threads import import_trimesh
 
 #: Texels along a side of a pattern, which repeats.
 TEXELS = 640
@@ -30,6 +36,20 @@ TEXELS = 640
 #: Directions in which the coordinates of a pattern grow, for axes x, y, z. The pattern is the same along their cross
 #: product, which is about as far from all faces of a box.
 ACROSS = np.array([[0.82, 0.0, -0.57], [-0.29, 0.87, -0.41]])
+
+#: Cells along the longest side of a body, in which places for bubbles are looked for, and how far the lines that find
+#: them are off the grid, so that they miss the edges of boxes.
+CELLS = 40
+OFF_GRID = np.array([0.0137, 0.0071, 0.0113])
+
+#: Typical radius of a bubble, as a fraction of the depth of the deepest point of the body: 0.2 mm in a cube of 4 cm.
+BUBBLE = 0.008
+
+#: Semi-axis of bubbles that have 80 faces and not 20, as a fraction of the diagonal of the body.
+LARGE = 0.004
+
+#: Standard deviation of the slopes of melted ice along each of two directions.
+SLOPE = 0.06
 
 
 @dataclass(frozen=True)
@@ -39,13 +59,16 @@ class Pattern:
     Attributes
     ----------
     period : float
-        Metres after which it repeats.
+        Metres after which its textures repeat.
     surfaced : callable
         Gives a surface the textures of the pattern.
+    bubbles : int
+        Number of bubbles in a closed body.
     """
 
     period: float
     surfaced: Callable[[Surface], Surface]
+    bubbles: int = 0
 
 
 def uniform_scale(transform: npt.ArrayLike) -> float:
@@ -77,22 +100,93 @@ def patterned(mesh: Mesh, surface: Surface | None, name: str, scale: float = 1.0
     if name not in PATTERNS:
         found = f"no pattern has the name {name!r}"
         raise InputError(f"pattern of {mesh.name!r}", found, f"use one of {', '.join(PATTERNS)}")
-    return _unrolled(mesh, scale / PATTERNS[name].period), PATTERNS[name].surfaced(surface or Surface())
+    chosen = PATTERNS[name]
+    return _marked(mesh, scale / chosen.period, chosen.bubbles), chosen.surfaced(surface or Surface())
 
 
 @lru_cache(maxsize=4)
-def _unrolled(mesh: Mesh, frequency: float) -> Mesh:
-    """Mesh with texture coordinates, cached so that what renderers keep of a mesh stays."""
+def _marked(mesh: Mesh, frequency: float, bubbles: int) -> Mesh:
+    """Mesh with texture coordinates and bubbles, cached so that what renderers keep of a mesh stays."""
+    if bubbles and mesh.diagnosis.solid:
+        mesh = _with_cavities(mesh, *_bubbles(mesh, bubbles))
     return replace(mesh, uv=frequency * mesh.vertices @ ACROSS.T)
+
+
+def _with_cavities(mesh: Mesh, middles: Array, axes: Array) -> Mesh:
+    """Mesh with ellipsoidal cavities: middles (k, 3), and semi-axes (k, 3, 3) as rows of right-handed matrices."""
+    trimesh = import_trimesh("trimesh.creation")
+    coarse, fine = trimesh.icosahedron(), trimesh.icosphere(subdivisions=1)
+    large = np.linalg.norm(axes, axis=-1).max(axis=1, initial=0.0) > LARGE * mesh.diagonal
+    vertices, faces, count = [mesh.vertices], [mesh.faces], len(mesh.vertices)
+    for i, (middle, own) in enumerate(zip(middles, axes, strict=True)):
+        ball = fine if large[i] else coarse
+        vertices.append(np.asarray(ball.vertices @ own + middle))
+        faces.append(np.asarray(ball.faces[:, ::-1] + count, dtype=np.int32))
+        count += len(ball.vertices)
+    points = np.concatenate(vertices)
+    opaque = np.ones((count - len(mesh.vertices), 4))
+    colors = None if mesh.colors is None else np.concatenate([mesh.colors, opaque])
+    return replace(mesh, vertices=points, faces=np.concatenate(faces), uv=None, colors=colors)
+
+
+def _bubbles(mesh: Mesh, count: int) -> tuple[Array, Array]:
+    """Middles (k, 3) and semi-axes (k, 3, 3) of at most `count` bubbles in a closed mesh, apart from all else."""
+    from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+    inside, low, step = _cells_inside(mesh)
+    depth = distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1, 1:-1]
+    deepest = float(depth.max())
+    along = np.stack(np.gradient(gaussian_filter(depth, 0.5 * deepest)), axis=-1).reshape(-1, 3)
+    random = np.random.default_rng(5)
+    weights = np.where(depth > 2.0, depth, 0.0).ravel() ** 5
+    if not weights.any():
+        return np.zeros((0, 3)), np.zeros((0, 3, 3))
+    cells = random.choice(weights.size, 10 * count, p=weights / weights.sum())
+    middles = np.stack(np.unravel_index(cells, depth.shape), axis=1) + random.uniform(size=(len(cells), 3))
+    width = BUBBLE * deepest * np.exp(0.45 * random.standard_normal(len(cells)))
+    # Round in the middle, which freezes at once from all sides, and long around it.
+    long = random.uniform(size=len(cells)) > depth.ravel()[cells] / deepest
+    width *= np.where(long, 0.6, 1.0)
+    length = width * np.where(long, random.uniform(4.0, 20.0, len(cells)), 1.0)
+    chosen = np.zeros(0, dtype=np.int64)
+    for i in np.flatnonzero(length < depth.ravel()[cells] - 2.0):
+        apart = np.square(middles[chosen] - middles[i]).sum(axis=1) > np.square(length[chosen] + length[i])
+        if apart.all():
+            chosen = np.append(chosen, i)
+        if len(chosen) == count:
+            break
+    axes = _frames(along[cells[chosen]] + 1e-3 * random.standard_normal((len(chosen), 3)))
+    axes *= np.stack([width[chosen], width[chosen], length[chosen]], axis=1)[..., None]
+    return low + step * middles[chosen], step * axes
+
+
+def _frames(last: Array) -> Array:
+    """(k, 3, 3): right-handed orthonormal rows, the last along these vectors."""
+    last = last / np.linalg.norm(last, axis=1, keepdims=True)
+    first = np.cross(last, np.eye(3)[np.abs(last).argmin(axis=1)])
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(last, first), last], axis=1)
+
+
+def _cells_inside(mesh: Mesh) -> tuple[Mask, Array, float]:
+    """Cells (nx, ny, nz) whose middles are inside a closed mesh, their lower corner (3,), and their side."""
+    low, high = mesh.bounds
+    step = float((high - low).max()) / CELLS
+    shape = np.ceil((high - low) / step).astype(np.int64)
+    scaled = (mesh.vertices - low) / step - 0.5 + OFF_GRID
+    changes = np.zeros((int(shape[0] * shape[1]), int(shape[2]) + 1), dtype=np.int64)
+    lines = int(shape[0]), int(shape[1])
+    for line, height, sign in line_crossings(scaled[:, :2], scaled[:, 2], mesh.faces, lines):
+        np.add.at(changes, (line, np.clip(np.ceil(height), 0, shape[2]).astype(np.int64)), sign)
+    return np.cumsum(changes, axis=1)[:, :-1].reshape(shape) > 0, low, step
 
 
 def _veined(surface: Surface) -> Surface:
     return replace(surface, color_texture=_veins())
 
 
-def _frosted(surface: Surface) -> Surface:
-    covered, roughness = _frost()
-    return replace(surface, transmission_texture=covered, roughness_texture=roughness, diffuse_transmission=0.5)
+def _melted(surface: Surface) -> Surface:
+    return replace(surface, normal_texture=_waves())
 
 
 @lru_cache(maxsize=1)
@@ -107,15 +201,13 @@ def _veins() -> Texture:
 
 
 @lru_cache(maxsize=1)
-def _frost() -> tuple[Texture, Texture]:
-    """Cracks and patches of frost: fraction of light that passes by refraction, and factors of the roughness."""
-    random = np.random.default_rng(3)
-    first, second, where, patches, grains = (_field(random, decay) for decay in (2.2, 2.2, 2.2, 1.6, 1.3))
-    here, there = np.clip(0.4 + 0.6 * where, 0.0, 1.0), np.clip(0.4 - 0.6 * where, 0.0, 1.0)
-    cracks = np.maximum(here * _zeros(first, 0.03), 0.7 * there * _zeros(second, 0.02))
-    frost = 0.4 * np.clip(patches - 0.9, 0.0, 1.0) + 0.2 * np.clip(grains - 1.0, 0.0, 1.0)
-    covered = np.clip(0.75 * cracks + frost + 0.03, 0.0, 0.85)[..., None] * np.ones(3)
-    return _texture(1.0 - covered), _texture(0.25 + 1.5 * covered)
+def _waves() -> Texture:
+    """Normals of an uneven surface, as melting leaves it."""
+    field = _field(np.random.default_rng(5), 3.0)
+    slopes = np.stack([np.roll(field, 1, axis) - np.roll(field, -1, axis) for axis in (1, 0)], axis=-1)
+    slopes *= SLOPE / slopes.std()
+    normals = np.concatenate([slopes * (1.0, -1.0), np.ones((TEXELS, TEXELS, 1))], axis=-1)
+    return _texture(0.5 + 0.5 * normals / np.linalg.norm(normals, axis=-1, keepdims=True))
 
 
 def _field(random: np.random.Generator, decay: float) -> Array:
@@ -138,4 +230,4 @@ def _texture(values: Array) -> Texture:
 
 
 #: All patterns by name.
-PATTERNS = {"veins": Pattern(0.15, _veined), "frost": Pattern(0.09, _frosted)}
+PATTERNS = {"veins": Pattern(0.15, _veined), "bubbles": Pattern(0.06, _melted, 1200)}

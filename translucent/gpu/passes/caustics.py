@@ -34,8 +34,8 @@ _LANDED = ("landed_point", "landed_power", "landed_normal")
 _RECEIVED = ("photon_irradiance", "opaque_axial_depth", "receiver_normal")
 
 #: Photons of a pixel from which on they stay in it; fewer are spread. Of polished glass errors of pictures are larger
-#: with 4 and 16; rough interfaces blur caustics, and errors are smaller by a tenth to a half with four times as many.
-ENOUGH, ENOUGH_OF_ROUGH = 8.0, 32.0
+#: with 2 and 8; rough interfaces blur caustics, and errors are smaller by a tenth to a half with four times as many.
+ENOUGH, ENOUGH_OF_ROUGH = 4.0, 32.0
 
 #: Samples with photons, in frames of so many samples at least: drawing what they land on takes a fifth of a sample's
 #: time. Of the Sobol points the second four lie in the four quarters of a pixel, and their mean in its middle.
@@ -171,7 +171,7 @@ class CausticsPass:
         self._splat.bind(**landed_on, opaque_axial_depth=job.targets["opaque"].color_attachments[0])
         job.targets["photons"].use()
         add_up(self._gl)
-        self._splat.draw_points(program, count)
+        self._splat.draw_points(program, 4 * count)  # the pixels that it touches
 
     def draw_depth(self, job: FrameJob, objects: tuple[int, ...]) -> None:
         """Draw the depth of opaque objects."""
