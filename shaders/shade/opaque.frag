@@ -54,7 +54,7 @@ vec3 diffuse_radiance(vec3 normal) {
 void main() {
 #if SURFACE
     OpaqueSurface surface = opaque_surface_at(color.rgb, normalize(world_normal), from_eye, surface_uv, vertex_color);
-    if (surface.is_hole || (opaque_passed.w == 0.0 && !gl_FrontFacing)) { discard; }
+    if (surface.is_hole || (opaque_one_sided == 1.0 && !gl_FrontFacing)) { discard; }
 #endif
     opaque_axial_depth = axial * axial_depth_scale + axial_depth_start;
 #if !PROJECTED_DEPTH

@@ -38,7 +38,7 @@ from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
 from translucent.scene.lights import PositionalLight
 from translucent.scene.scene import Object, Scene
-from translucent.scene.surface import SMOOTH
+from translucent.scene.surface import SMOOTH, Surface
 
 #: A medium denser than this over the scene's diagonal is opaque anyway; the limit keeps float32 products finite.
 MAX_SCENE_OPTICAL_DEPTH = 1e30
@@ -253,16 +253,24 @@ def _surface(body: Object, sheet: float | None) -> Fields:
         "outwards": -1.0 if body.mesh.diagnosis.inverted else 1.0,
         "not_closed": not opaque and not body.mesh.diagnosis.solid,
         "plain": body.surface is None if opaque else body.plain,
-        "one_sided": not surface.double_sided,
         "color": body.base_color if opaque else np.asarray(surface.color),
-        "transmission": surface.transmission,
+        **surface_fields(surface),
         "ior": surface.ior if body.medium is None else body.medium.ior,
+    }
+
+
+def surface_fields(surface: Surface) -> Fields:
+    """Numbers of a surface by the names of their fields in the table of objects."""
+    return {
+        "transmission": surface.transmission,
+        "ior": surface.ior,
         "dispersion": surface.dispersion,
         "roughness": surface.roughness,
         "metallic": surface.metallic,
         "emissive": np.asarray(surface.emissive),
         "passed": surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color),
         "passed_share": surface.diffuse_transmission,
+        "one_sided": not surface.double_sided,
         "film": (surface.iridescence, surface.iridescence_ior, surface.iridescence_thickness),
         "clearcoat": surface.clearcoat,
         "clearcoat_roughness": surface.clearcoat_roughness,

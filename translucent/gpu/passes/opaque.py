@@ -13,6 +13,7 @@ from translucent.gpu.job import CameraView, FrameJob, TextureBackdrop
 from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
 from translucent.gpu.resources import Resources
 from translucent.gpu.shaders import set_uniform, set_used
+from translucent.gpu.uniforms import surface_fields
 from translucent.media.colors import ColorLike
 from translucent.planning.passes import PassSpec
 from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS
@@ -149,17 +150,10 @@ def interface_shadow_switches(job: FrameJob) -> dict[str, bool]:
 def set_surface(view: CameraView, program: moderngl.Program, surface: Surface, hole_below: float) -> None:
     """Set the surface of an object for ``shaders/shade/opaque_surface.glsl``, with holes where alpha is below that."""
     view.resources.textures.bind(surface, program, len(_MAPS))
-    passed = surface.diffuse_transmission * np.asarray(surface.diffuse_transmission_color)
-    set_uniform(program, "opaque_parameters", (surface.metallic, surface.roughness, surface.ior, hole_below))
+    set_uniform(program, "opaque_hole_below", hole_below)
     # Not all are where an object only emits light, or only its depth is needed.
-    values = {
-        "opaque_emissive": tuple(np.asarray(surface.emissive)),
-        "opaque_passed": (*passed, surface.double_sided),
-        "opaque_passed_share": surface.diffuse_transmission,
-        "opaque_film": (surface.iridescence, surface.iridescence_ior, surface.iridescence_thickness),
-        "opaque_clearcoat": (surface.clearcoat, surface.clearcoat_roughness),
-    }
-    set_used(program, values)
+    values = {f"opaque_{name}": np.asarray(value, np.float64) for name, value in surface_fields(surface).items()}
+    set_used(program, {name: value.item() if value.ndim == 0 else tuple(value) for name, value in values.items()})
 
 
 def blurred_opaque(job: FrameJob) -> tuple[moderngl.Texture, moderngl.Texture]:
