@@ -2,13 +2,13 @@
 
     python tools/find_specks.py --presets jade,soap --meshes cube,spike --out out/specks
 
-A pixel is a speck if it is farther from the median of its eight neighbors than four times the spread of the 24 around
-it, and each of the eight is at least half as far away from it: lines, edges and corners of things are none. What is
-still there with four times as many samples is counted apart: highlights that are a pixel wide, or faults that no sample
-mends, to be looked at.
+A pixel is isolated if it is brighter than each of its eight neighbors, or darker, by half as much as it is off their
+median, and that is more than four times the spread of the 24 around it: lines, edges, corners and flanks of highlights
+are none. It is a speck if the truth, a picture `FINER` times as wide that is averaged to the same pixels, is not off in
+the same direction there by half as much. What the truth has, such as grains of frost and glints that are smaller than a
+pixel, is counted apart.
 
-Prints a row for each picture with specks, and writes the
-pictures in which they are, marked.
+Prints a row for each picture with isolated pixels, and writes their pictures.
 """
 
 from __future__ import annotations
@@ -31,20 +31,33 @@ Array = npt.NDArray[np.float64]
 #: Spreads by which a pixel is off, the least spread as a fraction of the median, and pixels left out at silhouettes.
 MOST, LEAST_SPREAD, RIM = 4.0, 0.02, 3
 
+#: Pixels of the truth along a side of a pixel, and the part of what a pixel is off that the truth must be off, too.
+FINER, CONFIRMED = 4, 0.5
+
 #: Normalisation of the median absolute deviation to a standard deviation.
 _NORMAL = 1.4826
 
 
-def specks(radiance: Array, inside: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+def isolated(radiance: Array, inside: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """(h, w): isolated pixels of a picture (h, w, 3), of those `inside` (h, w) a silhouette."""
     light = radiance.mean(axis=-1)
     around, wide = _shifted(light, 1), _shifted(light, 2)
     median = np.median(around, axis=0)
     spread = _NORMAL * np.median(np.abs(wide - np.median(wide, axis=0)), axis=0)
-    off = np.abs(light - median)
-    far = off > MOST * np.maximum(spread, LEAST_SPREAD * np.abs(median))
-    alone = np.abs(around - light).min(axis=0) > 0.5 * off
+    off = light - median
+    far = np.abs(off) > MOST * np.maximum(spread, LEAST_SPREAD * np.abs(median))
+    alone = (np.sign(off) * (light - around)).min(axis=0) > 0.5 * np.abs(off)
     return np.asarray(far & alone & binary_erosion(inside, iterations=RIM))
+
+
+def confirmed(radiance: Array, fine: Array) -> npt.NDArray[np.bool_]:
+    """(h, w): pixels of a picture (h, w, 3) that are off in a picture (h FINER, w FINER, 3) of the same scene, too."""
+    height, width, _ = radiance.shape
+    truth = fine.reshape(height, FINER, width, FINER, 3).mean(axis=(1, 3))
+    off, there = (
+        light - np.median(_shifted(light, 1), axis=0) for light in (radiance.mean(axis=-1), truth.mean(axis=-1))
+    )
+    return np.asarray(there * np.sign(off) > CONFIRMED * np.abs(off))
 
 
 def _shifted(light: Array, reach: int) -> Array:
@@ -106,14 +119,14 @@ def main() -> None:
                     scene = showcase(mesh, tl.preset(name), size, stage=None if stage == "none" else stage)
                     frame = renderer.render(scene, size, samples=options.samples)
                     light, covered = np.asarray(frame.radiance, np.float64), np.asarray(frame.coverage)
-                    found = specks(light, covered)
+                    found = isolated(light, covered)
                     if not found.any():
                         continue
-                    more = renderer.render(scene, size, samples=4 * options.samples)
-                    settled = found & specks(np.asarray(more.radiance, np.float64), covered)
-                    total += int(found.sum() - settled.sum())
+                    finer = renderer.render(scene, (FINER * size[0], FINER * size[1]), samples=options.samples)
+                    there = found & confirmed(light, np.asarray(finer.radiance, np.float64))
+                    total += int(found.sum() - there.sum())
                     row, column = np.argwhere(found)[0]
-                    counts = f"{found.sum() - settled.sum()} specks, {settled.sum()} that stay"
+                    counts = f"{found.sum() - there.sum()} specks, {there.sum()} of the scene"
                     print(f"{shape} {stage} {name}: {counts}, the first at {column}, {row}", flush=True)
                     if options.out is not None:
                         options.out.mkdir(parents=True, exist_ok=True)
