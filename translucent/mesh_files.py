@@ -45,6 +45,14 @@ _GLTF = {"glb", "gltf"}
 #: Formats that trimesh reads into arrays of vertices and faces, without transforms.
 _PLAIN = {"obj", "off", "ply", "stl"}
 
+#: Headers of binary .ply files with nothing but triangles, and the types of their numbers.
+_PLY = re.compile(
+    rb"ply\nformat binary_little_endian 1\.0\n(?:comment .*\n)*element vertex (\d{1,9})\n"
+    rb"property (float|double) x\nproperty \2 y\nproperty \2 z\n"
+    rb"element face (\d{1,9})\nproperty list uchar (ushort|int|uint) vertex_ind(?:ices|ex)\nend_header\n"
+)
+_PLY_TYPES = {b"float": "<f4", b"double": "<f8", b"ushort": "<u2", b"int": "<i4", b"uint": "<u4"}
+
 #: Suffixes of the native files of programs that can all export .glb.
 _SCENES_OF_PROGRAMS = (
     ".blend",
@@ -126,7 +134,8 @@ def load_mesh(
 def _read(path: Path, allow_outside: bool) -> Triangles:
     asked = f"mesh {str(path)!r}"
     require_file(path, asked)
-    if path.suffix[1:].lower() not in _GLTF and path.suffix[1:].lower() not in mesh_formats():
+    suffix = path.suffix[1:].lower()
+    if suffix not in _GLTF | _PLAIN and suffix not in mesh_formats():
         do = (
             "export it as .glb" if path.suffix.lower() in _SCENES_OF_PROGRAMS else "use glb, gltf, obj, stl, ply or off"
         )
@@ -170,7 +179,9 @@ def read_triangles(path: Path, asked: str, allow_outside: bool = False) -> Trian
 
 
 def _parts(stream: BinaryIO, kind: str) -> list[Triangles]:
-    """Triangles of each part of a file, by trimesh."""
+    """Triangles of each part of a file, by trimesh, which takes longer to import than a small file to be drawn."""
+    if kind == "ply" and (found := _plain_ply(stream)) is not None:
+        return [found]
     trimesh, loaders = import_trimesh(), import_trimesh("trimesh.exchange.load").mesh_loaders
     known = {"skip_materials": True} if kind in ("obj", "ply") else {}
     if kind in _PLAIN:
@@ -182,6 +193,24 @@ def _parts(stream: BinaryIO, kind: str) -> list[Triangles]:
         stream.seek(0)
     scene = trimesh.load_scene(stream, file_type=kind, resolver=_NoLinks(), process=False, **known)
     return foreign_parts(scene) or []
+
+
+def _plain_ply(stream: BinaryIO) -> Triangles | None:
+    """Triangles of a binary .ply file that holds no more than these; None of any other file, damaged ones too."""
+    content = stream.read()
+    stream.seek(0)
+    if (header := _PLY.match(content)) is None:
+        return None
+    corner, index = np.dtype(_PLY_TYPES[header[2]]), np.dtype(_PLY_TYPES[header[4]])
+    face = np.dtype([("corners", "u1"), ("vertices", index, 3)])
+    vertices, faces, begin = int(header[1]), int(header[3]), header.end()
+    if len(content) != begin + 3 * corner.itemsize * vertices + face.itemsize * faces:
+        return None
+    positions = np.frombuffer(content, corner, 3 * vertices, begin).reshape(-1, 3)
+    listed = np.frombuffer(content, face, faces, begin + positions.nbytes)
+    if (listed["corners"] != 3).any() or listed["vertices"].max(initial=0) >= vertices:
+        return None
+    return positions.astype(np.float64), listed["vertices"].astype(np.int32), None
 
 
 def _is_plain(content: dict[str, Any]) -> bool:

@@ -59,11 +59,6 @@ struct PrimaryHit {
     uvec2 pixel;        // in all of the picture, for random numbers
 };
 
-// What is known of a ray before a step.
-const int EITHER = 0;
-const int HITS = 1;
-const int LEAVES = 2;
-
 // Branches that go on behind a step.
 const int NONE = 0;
 const int ONE = 1;      // the ray alone
@@ -339,19 +334,30 @@ int interact(inout Ray ray, out Ray weaker, Interaction at, ObjectRow body, Hit 
     return branch(ray, weaker, back, on, again, bare == 1.0, last);
 }
 
+// What a ray is in that hits nothing: where all solids are closed, it has passed an edge by rounding.
+void leave_bodies(inout Ray ray, inout int effective) {
+    if (all_closed == 0) { return; }
+    ray.interior = uvec4(0u);
+    effective = AIR;
+}
+
+// Lets a ray end that hits nothing.
+void leave(Ray ray, Hit hit) {
+    int before = effective_medium(ray.interior);
+    leave_bodies(ray, before);
+    through_media(ray, before, hit, vec3(0.0));
+    escape(ray, escaped_ray(ray, AIR, vec3(0.0), ray.origin));
+}
+
 // Lets a ray interact with the surface that it hits, and returns which branches go on. hit: the nearest one, or that of `first_hit`;
-// where nothing is hit as far as its path, which is not NOTHING, the ray stays as it is.
-int follow_to_end(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int channel, int known) {
+// where nothing is hit as far as its path, which is not NOTHING, the ray stays as it is. hits: it is known to hit something.
+int follow_to_end(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int channel, bool hits) {
     int before = effective_medium(ray.interior);
     bool sound = true;
-    SurfaceHit surface;
-    if (known != LEAVES) { surface = surface_hit(ray.origin, ray.direction, ray.interior, 0.0, hit, before, channel, sound); }
-    bool leaves = known == LEAVES || (known == EITHER && hit.object < 0);
+    SurfaceHit surface = surface_hit(ray.origin, ray.direction, ray.interior, 0.0, hit, before, channel, sound);
+    bool leaves = !hits && hit.object < 0;
     if (leaves && hit.path < NOTHING) { return ONE; }
-    if (leaves && all_closed == 1) {
-        ray.interior = uvec4(0u);
-        before = AIR;
-    }
+    if (leaves) { leave_bodies(ray, before); }
     vec3 passed = through_media(ray, before, hit, leaves ? vec3(0.0) : surface.smooth_normal);
     if (leaves) {
         escape(ray, escaped_ray(ray, AIR, vec3(0.0), ray.origin));
@@ -398,8 +404,8 @@ int follow_to_end(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, in
 }
 
 // The same with the light at the ends of rays.
-int follow(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int channel, int known) {
-    int goes_on = follow_to_end(ray, weaker, hit, primary, channel, known);
+int follow(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int channel) {
+    int goes_on = follow_to_end(ray, weaker, hit, primary, channel, false);
     add_ends();
     return goes_on;
 }

@@ -34,13 +34,11 @@ void main() {
     uint word = uint(live_rays[2 * live_rows + at]);
     int channel = channel_of(word);
 #if MISSES
-    Hit hit = Hit(NOTHING, -1, -1, vec2(0.0));
-    const int known = LEAVES;
+    leave(ray, Hit(NOTHING, -1, -1, vec2(0.0)));
+    traced_radiance += first_throughput * radiance_beyond(first_end);
 #else
     Hit hit = Hit(intBitsToFloat(live_rays[3 * live_rows + at]), live_rays[4 * live_rows + at], live_rays[5 * live_rows + at],
         intBitsToFloat(ivec2(live_rays[6 * live_rows + at], live_rays[7 * live_rows + at])));
-    const int known = HITS;
-#endif
     PrimaryHit primary = PrimaryHit(AIR, vec3(0.0), vec3(0.0), 0.0, 0.0, vec3(0.0), 0.0, uvec2(0u));
     primary.pixel = pixel_number(pixel_of(word));
     // Loops in place of branches: processors that draw compute both sides of a branch for all rays, and leave a loop that none needs.
@@ -50,10 +48,7 @@ void main() {
         primary = primary_hit(pixel_at(pixel_of(word)), front, variance);
     }
     Ray weaker;
-    int goes_on = follow_to_end(ray, weaker, hit, primary, channel, known), stored = 0;
-#if MISSES
-    traced_radiance += first_throughput * radiance_beyond(first_end);
-#else
+    int goes_on = follow_to_end(ray, weaker, hit, primary, channel, true), stored = 0;
     while (ends > 0) {
         vec3 throughput;
         EscapedRay end = take_end(throughput);

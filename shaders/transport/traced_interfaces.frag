@@ -44,7 +44,7 @@ void trace(Ray ray, PrimaryHit primary, float reach, int channel) {
     Ray stack[MOST_FORKED], weaker;
     int stacked = 0, goes_on = ONE;
     for (int segment = 0; segment < MOST_SEGMENTS; ++segment) {
-        goes_on = follow(ray, weaker, first_hit(ray.origin, ray.direction, 0.0, reach), primary, channel, EITHER);
+        goes_on = follow(ray, weaker, first_hit(ray.origin, ray.direction, 0.0, reach), primary, channel);
         reach = NOTHING;  // the rasterizer sees some edges a little elsewhere
         if (goes_on == BOTH) {
             stack[stacked++] = weaker;

@@ -1,9 +1,5 @@
 """A shader as one text for another engine: switches decided, constants and includes written out, nothing unused.
 
-The parts of a text are its top-level declarations, found by braces and semicolons. What is reached from ``main``,
-or in a library from the functions of the file itself, stays, and with it whatever has the same name: a name that is
-used for two things keeps both, so nothing that is needed can get lost.
-
 For Vulkan, and the translators that read its GLSL, loose uniforms are in a block, textures apart from samplers, and
 everything has its place in one descriptor set: uniform blocks at their binding points, then loose uniforms, textures
 and samplers, which each stage has for itself. Matrices are stored column by column, as engines do. Inputs and outputs
@@ -12,7 +8,6 @@ of stages have locations by their names, so that stages that were written out ap
 
 from __future__ import annotations
 
-import ast
 import re
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
@@ -24,7 +19,7 @@ from translucent.assets import shader_names
 from translucent.errors import InputError, close_names, did_you_mean
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.layout import BLOCKS, UniformBlock
-from translucent.gpu.shaders import Gathered, gather
+from translucent.gpu.shaders import DIRECTIVE, Gathered, decided_lines, gather, parts_of, reached, used_constants
 
 #: GLSL of desktops, that of WebGL2, which is GLSL ES 3.00, and that of Vulkan.
 Dialect = Literal["glsl", "webgl2", "vulkan"]
@@ -186,19 +181,7 @@ class _Places:
         )
 
 
-_NAME = re.compile(r"[A-Za-z_]\w*")
-_COMMENT = re.compile(r"//.*")
-_FUNCTION = re.compile(r"[\w\s\[\]]*?\b(\w+)\s*\([^;{]*\)\s*\{")
-#: GLSL keywords and types, which no declaration can have as its name.
-_MACRO = re.compile(r"\s*#define (\w+)")
-_WORDS = re.compile(
-    r"[iub]?vec[234]|mat[234](x[234])?|float|u?int|bool|void|[iu]?sampler\w+|const|uniform|buffer|struct|layout|std140|"
-    r"std430|row_major|binding|location|define|if|else|for|while|return|in|out|inout|flat|\d\w*"
-)
-_FACE = re.compile(r"\s*(layout\s*\([^)]*\)\s*)?(flat\s+)?(in|out|invariant)\b")
-_LINE = re.compile(r"#line \d+ (\d+)$")
 _BLOCK = re.compile(r"^layout\(std140, row_major\) uniform (\w+) \{", re.MULTILINE)
-_DIRECTIVE = re.compile(r"\s*#\s*(if|elif|else|endif|error)\b(.*)$")
 
 
 @dataclass(frozen=True)
@@ -228,33 +211,6 @@ class Lifted:
     files: tuple[str, ...]
     blocks: tuple[UniformBlock, ...]
     text: str
-
-
-@dataclass
-class _Part:
-    """Part of a shader: a top-level declaration with the comment above it, or a comment that stands alone."""
-
-    file: int
-    text: str
-    code: str
-
-    @property
-    def function(self) -> str | None:
-        """Name of the function that the part defines."""
-        match = _FUNCTION.match(self.code.strip())
-        return None if match is None else match[1]
-
-    @property
-    def names(self) -> set[str]:
-        """All names in the part."""
-        return {name for name in _NAME.findall(self.code) if not _WORDS.fullmatch(name)}
-
-    @property
-    def declares(self) -> set[str]:
-        """Names that other parts may need from it: that of a function or macro, or any name in the part."""
-        if macro := _MACRO.match(self.code):
-            return {macro[1]}
-        return self.names if self.function is None else {self.function}
 
 
 def find_shader(name: str) -> str:
@@ -314,7 +270,7 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
             f"use one of its switches: {known}" if known else "omit --define, because this shader has no switches",
         )
     missing: set[str] = set()
-    parts = list(_parts(_decided(name, gathered, defines, missing)))
+    parts = list(parts_of(decided_lines(name, gathered, defines, missing)))
     if missing:
         least = _raised(name, gathered, dict.fromkeys(gathered.switches, 0) | dict(defines), frozenset(defines))
         least = least or dict.fromkeys(missing, 1)
@@ -323,7 +279,7 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
         raise InputError(
             f"shader {name!r}", f"the shader needs {count} more switches", f"add {options}, or choose other values"
         )
-    kept = _reached(parts)
+    kept = reached(parts)
     used = set().union(*(part.names for part in kept))
     texts = [part.text.strip("\n") for part in kept]
     code = "\n".join(part.code for part in kept)
@@ -331,46 +287,11 @@ def lift(name: str, defines: Mapping[str, int], target: Dialect = "glsl") -> Lif
     body = "\n\n".join(in_vulkan(name, texts, code) if target == "vulkan" else texts)
     decided = {key: int(value) for key, value in defines.items()}
     defined = [f"#define {key} {value}" for key, value in decided.items() if key in used]
-    defined += [f"#define {key} {CONSTANTS[key]}" for key in _constants(used)]
+    defined += [f"#define {key} {CONSTANTS[key]}" for key in used_constants(used)]
     files = tuple(dict.fromkeys(gathered.files[part.file] for part in kept))
     blocks = tuple(BLOCKS[key] for key in _BLOCK.findall(code))
     text = "\n".join([*head, *defined, "", body, ""])
     return Lifted(name, target, version, decided, files, blocks, text)
-
-
-def _decided(name: str, gathered: Gathered, defines: Mapping[str, int], missing: set[str]) -> Iterator[tuple[int, str]]:
-    """Lines that remain after preprocessing the switches, each with the number of its file.
-
-    Switches that conditions ask for and nobody has decided go into `missing`: lines are not to be used then.
-    """
-    file = 0
-    live, done = [True], [True]  # for each nested condition: whether we are in, and whether a branch has been taken
-    for line in gathered.lines:
-        if match := _LINE.match(line):
-            file = int(match[1])
-            continue
-        match = _DIRECTIVE.match(line)
-        word, rest = (match[1], _COMMENT.sub("", match[2]).strip()) if match else ("", "")
-        if word in ("if", "elif"):
-            if word == "elif":
-                live.pop()
-            taken = done.pop() if word == "elif" else False
-            reached = live[-1] and not taken
-            absent = {key for key in _NAME.findall(rest) if key not in defines} if reached else set()
-            missing |= absent
-            text = re.sub(r"!(?!=)", " not ", rest.replace("&&", " and ").replace("||", " or ")).strip()
-            holds = reached and not absent and bool(_evaluated(ast.parse(text, mode="eval").body, defines))
-            live.append(live[-1] and holds)
-            done.append(taken or holds)
-        elif word == "else":
-            live[-1] = live[-2] and not done[-1]
-        elif word == "endif":
-            live.pop()
-            done.pop()
-        elif live[-1] and word == "error" and not missing:
-            raise InputError(f"shader {name!r}", rest, "choose other values for --define")
-        elif live[-1] and not word:
-            yield file, line
 
 
 def valid_sets(name: str) -> list[dict[str, int]]:
@@ -380,7 +301,7 @@ def valid_sets(name: str) -> list[dict[str, int]]:
     only what that value needs.
     """
     gathered = gather(name)
-    conditions = [match[2] for line in gathered.lines if (match := _DIRECTIVE.match(line))]
+    conditions = [match[2] for line in gathered.lines if (match := DIRECTIVE.match(line))]
     choices = {
         key: sorted({0, 1, *(int(n) for text in conditions for n in re.findall(rf"\b{key} == (\d+)", text))})
         for key in sorted(gathered.switches)
@@ -404,87 +325,7 @@ def _raised(name: str, gathered: Gathered, values: Mapping[str, int], kept: froz
 def _accepted(name: str, gathered: Gathered, values: Mapping[str, int]) -> bool:
     """True if no line of a shader that is left with these values refuses them."""
     try:
-        deque(_decided(name, gathered, values, set()), maxlen=0)
+        deque(decided_lines(name, gathered, values, set()), maxlen=0)
     except InputError:
         return False
     return True
-
-
-def _evaluated(node: ast.expr, defines: Mapping[str, int]) -> int:
-    """Value of a preprocessor condition of whole numbers and switches, as Python parses it."""
-    match node:
-        case ast.Constant(value=int(value)):
-            return value
-        case ast.Name(id=key):
-            return int(defines[key])
-        case ast.UnaryOp(op=ast.Not(), operand=operand):
-            return not _evaluated(operand, defines)
-        case ast.BoolOp(op=op, values=values):
-            found = [_evaluated(value, defines) for value in values]
-            return all(found) if isinstance(op, ast.And) else any(found)
-        case ast.Compare(left=left, ops=[op], comparators=[right]):
-            a, b = _evaluated(left, defines), _evaluated(right, defines)
-            return {ast.Eq: a == b, ast.NotEq: a != b, ast.Lt: a < b, ast.Gt: a > b}[type(op)]
-    raise ValueError(f"this is not a condition on whole numbers: {ast.unparse(node)}")
-
-
-def _parts(lines: Iterable[tuple[int, str]]) -> Iterator[_Part]:
-    """Top-level declarations in order, without constants, which are written anew."""
-    above: list[str] = []
-    part: list[str] = []
-    depth = 0
-    last = 0
-    for file, line in lines:
-        code = _COMMENT.sub("", line)
-        if not part and not code.strip():
-            # A comment apart from what follows speaks of the file.
-            if (not line.strip() or file != last) and above:
-                yield _Part(last, "\n".join(above), "")
-                above = []
-            above += [line] if line.strip() else []
-            last = file
-            continue
-        if not part and (define := re.match(r"\s*#define (\w+)", line)) and define[1] in CONSTANTS:
-            continue
-        last = file
-        part.append(line)
-        depth += code.count("{") - code.count("}") + code.count("(") - code.count(")")
-        if depth == 0 and (code.lstrip().startswith("#") or code.rstrip().endswith((";", "}"))):
-            text = "\n".join(part)
-            yield _Part(file, "\n".join([*above, text]), "\n".join(_COMMENT.sub("", one) for one in part))
-            above, part = [], []
-    if above:
-        yield _Part(last, "\n".join(above), "")
-
-
-def _reached(parts: list[_Part]) -> list[_Part]:
-    """Parts that the shader needs, and the comments on files that have such parts."""
-    functions = {part.function for part in parts}
-    declaring: dict[str, list[_Part]] = {}
-    for part in parts:
-        for name in part.declares:
-            declaring.setdefault(name, []).append(part)
-    # Inputs and outputs of a stage have to match the neighboring stage.
-    roots = [
-        part
-        for part in parts
-        if (part.function == "main" if "main" in functions else part.file == 0) or _FACE.match(part.code)
-    ]
-    kept = {id(part) for part in roots}
-    waiting = roots
-    while waiting:
-        for name in waiting.pop().names:
-            for part in declaring.get(name, ()):
-                if id(part) not in kept:
-                    kept.add(id(part))
-                    waiting.append(part)
-    files = {part.file for part in parts if id(part) in kept and part.code}
-    return [part for part in parts if (id(part) in kept if part.code else part.file in files)]
-
-
-def _constants(used: set[str]) -> list[str]:
-    """Constants that are used, directly or by other constants, in the order in which they are written."""
-    needed = {key for key in CONSTANTS if key in used}
-    while more := {key for one in needed for key in _NAME.findall(CONSTANTS[one]) if key in CONSTANTS} - needed:
-        needed |= more
-    return [key for key in CONSTANTS if key in needed]

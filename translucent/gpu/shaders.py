@@ -1,10 +1,16 @@
-"""Programs from files in ``shaders/``: includes, constants from Python, and compiler messages with file and line."""
+"""Programs from files in ``shaders/``: includes, constants from Python, and compiler messages with file and line.
+
+The parts of a text are its top-level declarations, found by braces and semicolons. What is reached from ``main``, or in
+a library from the functions of the file itself, stays, and with it whatever has the same name: a name that is used for
+two things keeps both, so nothing that is needed can get lost.
+"""
 
 from __future__ import annotations
 
+import ast
 import re
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, TypeAlias
@@ -12,7 +18,7 @@ from typing import Any, TypeAlias
 import moderngl
 
 from translucent.assets import shader_path
-from translucent.errors import RenderError
+from translucent.errors import InputError, RenderError
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.layout import BLOCKS, TABLES, PackedTable, UniformBlock
 from translucent.threads import DeferredSignals
@@ -102,6 +108,18 @@ def before_drawing_with(gl: moderngl.Context, program: moderngl.Program, kinds: 
             budget.enter(used)
 
 
+_NAME = re.compile(r"[A-Za-z_]\w*")
+_COMMENT = re.compile(r"//.*")
+_FUNCTION = re.compile(r"[\w\s\[\]]*?\b(\w+)\s*\([^;{]*\)\s*\{")
+_MACRO = re.compile(r"\s*#define (\w+)")
+#: GLSL keywords and types, which no declaration can have as its name.
+_WORDS = re.compile(
+    r"[iub]?vec[234]|mat[234](x[234])?|float|u?int|bool|void|[iu]?sampler\w+|const|uniform|buffer|struct|layout|std140|"
+    r"std430|row_major|binding|location|define|if|else|for|while|return|in|out|inout|flat|\d\w*"
+)
+_FACE = re.compile(r"\s*(layout\s*\([^)]*\)\s*)?(flat\s+)?(in|out|invariant)\b")
+_LINE = re.compile(r"#line \d+ (\d+)$")
+DIRECTIVE = re.compile(r"\s*#\s*(if|elif|else|endif|error)\b(.*)$")
 _INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*(?://.*)?$')
 _CONDITION = re.compile(r"^\s*#\s*(?:if|elif|ifdef|ifndef)\b(.*)$")
 # "0:12(5): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12:" (others)
@@ -242,6 +260,176 @@ def _text(name: str, parents: tuple[str, ...]) -> str:
     return shader_path(name).read_text(encoding="utf-8")
 
 
+@dataclass
+class ShaderPart:
+    """Part of a shader: a top-level declaration with the comment above it, or a comment that stands alone."""
+
+    file: int
+    text: str
+    code: str
+
+    @property
+    def function(self) -> str | None:
+        """Name of the function that the part defines."""
+        match = _FUNCTION.match(self.code.strip())
+        return None if match is None else match[1]
+
+    @property
+    def names(self) -> frozenset[str]:
+        """All names in the part."""
+        return _names(self.code)
+
+    @property
+    def declares(self) -> frozenset[str]:
+        """Names that other parts may need from it: that of a function or macro, or any name in the part."""
+        if macro := _MACRO.match(self.code):
+            return frozenset([macro[1]])
+        return self.names if self.function is None else frozenset([self.function])
+
+
+@lru_cache(maxsize=4096)  # programs are made of the same parts
+def _names(code: str) -> frozenset[str]:
+    return frozenset(name for name in _NAME.findall(code) if not _WORDS.fullmatch(name))
+
+
+def decided_lines(
+    name: str, gathered: Gathered, defines: Mapping[str, int], missing: set[str]
+) -> Iterator[tuple[int, str]]:
+    """Lines that remain after preprocessing the switches, each with the number of its file.
+
+    Switches that conditions ask for and nobody has decided go into `missing`: lines are not to be used then.
+    """
+    file = 0
+    live, done = [True], [True]  # for each nested condition: whether we are in, and whether a branch has been taken
+    for line in gathered.lines:
+        if match := _LINE.match(line):
+            file = int(match[1])
+            continue
+        match = DIRECTIVE.match(line) if "#" in line else None
+        word, rest = (match[1], _COMMENT.sub("", match[2]).strip()) if match else ("", "")
+        if word in ("if", "elif"):
+            if word == "elif":
+                live.pop()
+            taken = done.pop() if word == "elif" else False
+            reached = live[-1] and not taken
+            absent = {key for key in _NAME.findall(rest) if key not in defines} if reached else set()
+            missing |= absent
+            holds = reached and not absent and bool(_evaluated(_condition(rest), defines))
+            live.append(live[-1] and holds)
+            done.append(taken or holds)
+        elif word == "else":
+            live[-1] = live[-2] and not done[-1]
+        elif word == "endif":
+            live.pop()
+            done.pop()
+        elif live[-1] and word == "error" and not missing:
+            raise InputError(f"shader {name!r}", rest, "choose other values for --define")
+        elif live[-1] and not word:
+            yield file, line
+
+
+@lru_cache(maxsize=1024)
+def _condition(text: str) -> ast.expr:
+    """A preprocessor condition, as Python parses it."""
+    text = re.sub(r"!(?!=)", " not ", text.replace("&&", " and ").replace("||", " or ")).strip()
+    return ast.parse(text, mode="eval").body
+
+
+def _evaluated(node: ast.expr, defines: Mapping[str, int]) -> int:
+    """Value of a preprocessor condition of whole numbers and switches, as Python parses it."""
+    match node:
+        case ast.Constant(value=int(value)):
+            return value
+        case ast.Name(id=key):
+            return int(defines[key])
+        case ast.UnaryOp(op=ast.Not(), operand=operand):
+            return not _evaluated(operand, defines)
+        case ast.BoolOp(op=op, values=values):
+            found = [_evaluated(value, defines) for value in values]
+            return all(found) if isinstance(op, ast.And) else any(found)
+        case ast.Compare(left=left, ops=[op], comparators=[right]):
+            a, b = _evaluated(left, defines), _evaluated(right, defines)
+            return {ast.Eq: a == b, ast.NotEq: a != b, ast.Lt: a < b, ast.Gt: a > b}[type(op)]
+    raise ValueError(f"this is not a condition on whole numbers: {ast.unparse(node)}")
+
+
+def parts_of(lines: Iterable[tuple[int, str]]) -> Iterator[ShaderPart]:
+    """Top-level declarations in order, without constants, which are written anew."""
+    above: list[str] = []
+    part: list[str] = []
+    depth = 0
+    last = 0
+    for file, line in lines:
+        code = _COMMENT.sub("", line) if "//" in line else line
+        if not part and not code.strip():
+            # A comment apart from what follows speaks of the file.
+            if (not line.strip() or file != last) and above:
+                yield ShaderPart(last, "\n".join(above), "")
+                above = []
+            above += [line] if line.strip() else []
+            last = file
+            continue
+        if not part and (define := re.match(r"\s*#define (\w+)", line)) and define[1] in CONSTANTS:
+            continue
+        last = file
+        part.append(line)
+        depth += code.count("{") - code.count("}") + code.count("(") - code.count(")")
+        if depth == 0 and (code.lstrip().startswith("#") or code.rstrip().endswith((";", "}"))):
+            text = "\n".join(part)
+            yield ShaderPart(file, "\n".join([*above, text]), "\n".join(_COMMENT.sub("", one) for one in part))
+            above, part = [], []
+    if above:
+        yield ShaderPart(last, "\n".join(above), "")
+
+
+def reached(parts: list[ShaderPart]) -> list[ShaderPart]:
+    """Parts that the shader needs, and the comments on files that have such parts."""
+    functions = {part.function for part in parts}
+    declaring: dict[str, list[ShaderPart]] = {}
+    for part in parts:
+        for name in part.declares:
+            declaring.setdefault(name, []).append(part)
+    # Inputs and outputs of a stage have to match the neighboring stage.
+    roots = [
+        part
+        for part in parts
+        if (part.function == "main" if "main" in functions else part.file == 0) or _FACE.match(part.code)
+    ]
+    kept = {id(part) for part in roots}
+    waiting = roots
+    while waiting:
+        for name in waiting.pop().names:
+            for part in declaring.get(name, ()):
+                if id(part) not in kept:
+                    kept.add(id(part))
+                    waiting.append(part)
+    files = {part.file for part in parts if id(part) in kept and part.code}
+    return [part for part in parts if (id(part) in kept if part.code else part.file in files)]
+
+
+def used_constants(used: Collection[str]) -> list[str]:
+    """Constants that are used, directly or by other constants, in the order in which they are written."""
+    needed = {key for key in CONSTANTS if key in used}
+    while more := {key for one in needed for key in _NAME.findall(CONSTANTS[one]) if key in CONSTANTS} - needed:
+        needed |= more
+    return [key for key in CONSTANTS if key in needed]
+
+
+def used_code(name: str, gathered: Gathered, source: ShaderSource, defines: Mapping[str, int]) -> str:
+    """Text of a shader with nothing that its switches leave out or that it does not use: compilers read all they get.
+
+    That is half of the time in which Mesa's makes a program. A shader that refuses the switches stays whole.
+    """
+    try:
+        parts = reached(list(parts_of(decided_lines(name, gathered, defines, set()))))
+    except InputError:
+        return source.text
+    head = source.text[: source.text.index("#line ")]
+    used = frozenset[str]().union(*(part.names for part in parts))
+    constants = (f"#define {key} {CONSTANTS[key]}" for key in used_constants(used))
+    return "\n".join([head, *constants, *(part.code for part in parts), ""])
+
+
 def build_program(
     gl: moderngl.Context,
     vertex: str,
@@ -270,17 +458,20 @@ def build_program(
         With the compiler's message, by file and line.
     """
     given = dict(defines or {})
-    stages = []
+    stages, texts = [], []
     for name in (vertex, fragment):
         gathered = gather(name)
         own = {key: value for key, value in given.items() if key in gathered.switches}
         stages.append(_with_switches(name, gathered, own, version))
+        texts.append(used_code(name, gathered, stages[-1], own))
     used = {key for stage in stages for key in given if f"#define {key} " in stage.text}
     if unused := sorted(given.keys() - used):
         raise RenderError(f"shaders {vertex!r} and {fragment!r}", f"neither shader uses {unused}", "check the spelling")
     try:
-        with DeferredSignals():
-            program = gl.program(vertex_shader=stages[0].text, fragment_shader=stages[1].text)
+        try:
+            program = _linked(gl, *texts)
+        except moderngl.Error:  # the compiler's message has to name lines of the files
+            program = _linked(gl, *(stage.text for stage in stages))
     except moderngl.Error as error:
         log = str(error)
         stage = stages[1] if "fragment_shader" in log else stages[0]
@@ -297,12 +488,22 @@ def build_compute(
     own = {key: value for key, value in (defines or {}).items() if key in gathered.switches}
     stage = _with_switches(name, gathered, own, 430)
     try:
-        with DeferredSignals():
-            program = gl.compute_shader(stage.text)
+        try:
+            program = _linked(gl, used_code(name, gathered, stage, own))
+        except moderngl.Error:
+            program = _linked(gl, stage.text)
     except moderngl.Error as error:
         raise _refused(stage, str(error)) from error
     _bind(program, [stage], samplers)
     return program
+
+
+def _linked(gl: moderngl.Context, *texts: str) -> Any:
+    """Program of a vertex and a fragment shader, or a compute shader."""
+    with DeferredSignals():
+        if len(texts) == 1:
+            return gl.compute_shader(*texts)
+        return gl.program(vertex_shader=texts[0], fragment_shader=texts[1])
 
 
 def _refused(stage: ShaderSource, log: str) -> RenderError:
