@@ -166,3 +166,17 @@ def test_no_function_of_a_shader_is_long() -> None:
     for path in sorted((Path(__file__).parents[2] / "shaders").rglob("*.*")):
         for found in re.finditer(r"^\w+ (\w+)\([^)]*\) \{\n(.*?)^\}", path.read_text(), re.MULTILINE | re.DOTALL):
             assert found[2].count("\n") < 79, f"{path.name}: {found[1]}"
+
+
+def test_compilers_get_the_used_code_alone(files: Path) -> None:
+    (files / "a.frag").write_text(
+        "out vec4 color;\nuniform float scale;\nuniform float other;\n"
+        "float inner() { return PI * scale; }\nfloat used() { return inner(); }\nfloat unused() { return other; }\n"
+        "#if SWITCH\nfloat switched() { return unused(); }\n#else\nfloat switched() { return used(); }\n#endif\n"
+        "void main() { color = vec4(switched()); }\n"
+    )
+    source, gathered = preprocess("a.frag", {"SWITCH": 0}), shaders.gather("a.frag")
+    text = shaders.used_code("a.frag", gathered, source, {"SWITCH": 0})
+    assert all(word in text for word in ("#version 330", "#define PI ", "out vec4 color", "scale;", "inner()"))
+    assert not any(word in text for word in ("unused", "other", "#if"))
+    assert "float unused()" in shaders.used_code("a.frag", gathered, source, {"SWITCH": 1})

@@ -69,6 +69,7 @@ def test_a_picture_is_the_same_with_lifted_shaders(
 
     expected = renderer.render(scene, SIZE, method)
     monkeypatch.setattr(shaders, "_with_switches", text_of)
+    monkeypatch.setattr(shaders, "used_code", lambda name, gathered, source, defines: source.text)
     with tl.Renderer() as other:
         frame = other.render(scene, SIZE, method)
     assert len(lifted) >= 3

@@ -31,6 +31,7 @@ from tests.values.handmade import (
     joined,
     moebius,
 )
+from translucent import mesh_files
 from translucent.geometry import winding
 from translucent.geometry.mesh import Mesh, mended
 from translucent.geometry.repair import WELD_TOLERANCE, weld
@@ -320,3 +321,34 @@ def test_texture_coordinates_of_several_materials_stay_as_they_are(tmp_path: Pat
     assert mesh.uv is not None
     np.testing.assert_allclose(mesh.uv[mesh.faces].min(axis=(0, 1)), [0.1, 0.2])
     np.testing.assert_allclose(mesh.uv[mesh.faces].max(axis=(0, 1)), [0.9, 0.8])
+
+
+@pytest.mark.parametrize("index", ["ushort", "int"])
+def test_a_plain_ply_is_read_without_trimesh(index: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As trimesh reads it; files with anything else in them are left to trimesh."""
+    header = (
+        "ply\nformat binary_little_endian 1.0\ncomment a tetrahedron\nelement vertex 4\n"
+        "property float x\nproperty float y\nproperty float z\n"
+        f"element face 4\nproperty list uchar {index} vertex_indices\nend_header\n"
+    ).encode()
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "<f4")
+    faces = np.zeros(4, [("count", "u1"), ("corners", "<u2" if index == "ushort" else "<i4", 3)])
+    faces["count"], faces["corners"] = 3, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    content = header + corners.tobytes() + faces.tobytes()
+    plain, other = tmp_path / "plain.ply", tmp_path / "other.ply"
+    plain.write_bytes(content)
+    other.write_bytes(content.replace(b"float", b"float32"))
+    by_trimesh = load_mesh(other)
+
+    def imported(module: str = "trimesh") -> None:
+        raise AssertionError(f"{module} is imported")
+
+    monkeypatch.setattr(mesh_files, "import_trimesh", imported)
+    mesh = load_mesh(plain)
+    np.testing.assert_array_equal(mesh.vertices, by_trimesh.vertices)
+    np.testing.assert_array_equal(mesh.faces, by_trimesh.faces)
+    assert mesh.diagnosis.solid
+    faces["corners"][0, 0] = 4
+    plain.write_bytes(header + corners.tobytes() + faces.tobytes())
+    with pytest.raises(tl.InputError, match=r"plain\.ply'; .*trimesh is imported"):
+        load_mesh(plain)

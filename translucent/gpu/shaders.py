@@ -271,8 +271,7 @@ class ShaderPart:
     @property
     def function(self) -> str | None:
         """Name of the function that the part defines."""
-        match = _FUNCTION.match(self.code.strip())
-        return None if match is None else match[1]
+        return _function(self.code)
 
     @property
     def names(self) -> frozenset[str]:
@@ -288,6 +287,12 @@ class ShaderPart:
 
 
 @lru_cache(maxsize=4096)  # programs are made of the same parts
+def _function(code: str) -> str | None:
+    match = _FUNCTION.match(code.strip()) if "{" in code else None
+    return None if match is None else match[1]
+
+
+@lru_cache(maxsize=4096)
 def _names(code: str) -> frozenset[str]:
     return frozenset(name for name in _NAME.findall(code) if not _WORDS.fullmatch(name))
 
@@ -369,14 +374,14 @@ def parts_of(lines: Iterable[tuple[int, str]]) -> Iterator[ShaderPart]:
             above += [line] if line.strip() else []
             last = file
             continue
-        if not part and (define := re.match(r"\s*#define (\w+)", line)) and define[1] in CONSTANTS:
+        if not part and "#" in line and (define := _MACRO.match(line)) and define[1] in CONSTANTS:
             continue
         last = file
         part.append(line)
         depth += code.count("{") - code.count("}") + code.count("(") - code.count(")")
         if depth == 0 and (code.lstrip().startswith("#") or code.rstrip().endswith((";", "}"))):
             text = "\n".join(part)
-            yield ShaderPart(file, "\n".join([*above, text]), "\n".join(_COMMENT.sub("", one) for one in part))
+            yield ShaderPart(file, "\n".join([*above, text]), _COMMENT.sub("", text) if "//" in text else text)
             above, part = [], []
     if above:
         yield ShaderPart(last, "\n".join(above), "")
@@ -424,7 +429,7 @@ def used_code(name: str, gathered: Gathered, source: ShaderSource, defines: Mapp
         parts = reached(list(parts_of(decided_lines(name, gathered, defines, set()))))
     except InputError:
         return source.text
-    head = source.text[: source.text.index("#line ")]
+    head = source.text.partition("#line ")[0]
     used = frozenset[str]().union(*(part.names for part in parts))
     constants = (f"#define {key} {CONSTANTS[key]}" for key in used_constants(used))
     return "\n".join([head, *constants, *(part.code for part in parts), ""])
