@@ -7,6 +7,7 @@ import io
 import math
 import re
 from collections.abc import Callable, Sequence
+from importlib.resources import files
 from typing import TYPE_CHECKING, NamedTuple, ParamSpec
 
 import numpy as np
@@ -16,6 +17,7 @@ from translucent.errors import printable
 from translucent.extras import require_package
 
 if TYPE_CHECKING:
+    from jinja2 import Environment
     from markupsafe import Markup
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -103,6 +105,29 @@ def require_packages() -> None:
     """Raise `RenderError` if what draws the page is not installed."""
     for module in ("markupsafe", "jinja2", "matplotlib"):
         require_package(module, "the page of the report")
+
+
+def page_templates(package: str, folder: str = "") -> Environment:
+    """Templates of a package's page, which escape all values and fail on unknown names.
+
+    Raises
+    ------
+    RenderError
+        If jinja2 is not installed.
+    """
+    jinja2 = require_package("jinja2", "the page")
+
+    def load(name: str) -> str:
+        return files(package).joinpath(folder, name).read_text(encoding="utf-8")
+
+    found: Environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(load),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return found
 
 
 def error_text(value: float | None) -> str:

@@ -300,15 +300,7 @@ def build_page(report: Report) -> str:
 @cache
 def _environment() -> Environment:
     """Templates, compiled once, that escape all values and fail on unknown names."""
-    from jinja2 import Environment, FunctionLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FunctionLoader(_resource),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = figures.page_templates("translucent.bench", "templates")
     environment.filters.update(
         error=figures.error_text,
         limit=figures.limit_text,

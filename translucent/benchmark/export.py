@@ -10,7 +10,6 @@ from __future__ import annotations
 import io
 import json
 import math
-import struct
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -28,10 +27,12 @@ from translucent.files.paths import OutputFiles, make_folder, write_text_atomica
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.normals import corner_normals
 from translucent.geometry.ray_caster import ray_caster_of
+from translucent.gltf.file import glb_bytes
 from translucent.gltf.materials import VOLUME
 from translucent.gltf.write import volume_extensions
 from translucent.interop.mitsuba import SAMPLES, beyond_mitsuba, to_mitsuba, units_per_metre
 from translucent.scene.environment import Environment
+from translucent.scene.environment_map import texel_directions
 from translucent.scene.lights import DirectionalLight, PointLight
 from translucent.scene.scene import Object, Scene
 
@@ -91,11 +92,7 @@ def environment_pixels(environment: Environment) -> Array:
     """(h, 2 h, 3) float32: radiance from all directions."""
     if environment.kind == "image":
         return np.asarray(environment.light_map.pixels, np.float32)
-    up = np.pi * (0.5 - (np.arange(ROWS) + 0.5) / ROWS)
-    around = 2 * np.pi * ((np.arange(2 * ROWS) + 0.5) / (2 * ROWS) - 0.5)
-    elevation, azimuth = (part.ravel() for part in np.meshgrid(up, around, indexing="ij"))
-    flat = np.cos(elevation)
-    directions = np.stack([flat * np.sin(azimuth), np.sin(elevation), -flat * np.cos(azimuth)], axis=-1)
+    directions = texel_directions(ROWS, 2 * ROWS).reshape(-1, 3)
     radiance = environment.radiance(directions, np.zeros((len(directions), 2)))
     return radiance.reshape(ROWS, 2 * ROWS, 3).astype(np.float32)
 
@@ -112,10 +109,7 @@ def hdr_of(pixels: Array) -> bytes:
 
 def mean_chord(item: Object) -> float:
     """Mean length of random straight paths through a body, 4 V / S (Cauchy), in metres: a thicknessFactor for glTF."""
-    corners = item.mesh.vertices[item.mesh.faces] @ item.matrix[:3, :3].T + item.matrix[:3, 3]
-    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    volume = abs(float((corners[:, 0] * crosses).sum())) / 6
-    return 4 * volume / float(np.linalg.norm(crosses, axis=1).sum() / 2)
+    return 2.0 * item.mean_thickness
 
 
 def corner_thickness(corners: Array) -> Array:
@@ -296,10 +290,7 @@ def glb_of(made: Scene) -> bytes:
         content["extensionsUsed"] = sorted(used)
     binary = b"".join(parts)
     content["buffers"] = [{"byteLength": len(binary)}]
-    text = json.dumps(content, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary
-    return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
+    return glb_bytes(content, binary)
 
 
 def _gltf_material(item: Object) -> Json:

@@ -9,7 +9,6 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ import numpy as np
 from PIL import Image
 
 from translucent.arrays import Array
+from translucent.bench.figures import page_templates
 from translucent.benchmark.results import FLOOR, Results, SceneResult, picture_path, read_picture
 from translucent.benchmark.scenes import FEATURES, SCENES, BenchmarkScene, promise_kept
 from translucent.benchmark.truth import AGREEING, TruthPicture, read_records, stored_truth_of, truth_path
@@ -178,15 +178,7 @@ def write_benchmark_page(results: Sequence[Results], path: Path) -> None:
 
 @cache
 def _templates() -> Environment:
-    jinja2 = require_package("jinja2", "the page")
-
-    def load(name: str) -> str:
-        return files("translucent.benchmark").joinpath(name).read_text(encoding="utf-8")
-
-    found: Environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(load), autoescape=True, trim_blocks=True, lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )  # fmt: skip
+    found = page_templates("translucent.benchmark")
     found.filters["percent"] = lambda value: "-" if _no(value) else f"{100 * value:.1f} %"
     found.filters["signed"] = lambda value: "-" if _no(value) else f"{100 * value:+.1f}"
     found.filters["plain"] = lambda value: "-" if _no(value) else f"{value:.3g}"

@@ -19,6 +19,7 @@ from translucent.media.medium import Medium
 from translucent.media.presets import preset
 from translucent.scene.camera import Camera
 from translucent.scene.environment import Environment
+from translucent.scene.environment_map import texel_directions
 from translucent.scene.lights import DirectionalLight, Light, PointLight
 from translucent.scene.scene import Object, Overlap, Scene
 from translucent.scene.surface import Surface
@@ -126,16 +127,12 @@ def _tinted(mesh: Mesh, color: Sequence[float], part: float = 0.3, ior: float = 
 @cache
 def soft_sun() -> Environment:
     """Sky with a sun that is blurred to a lobe 25 degrees wide, so that random paths find it by chance."""
-    height = 64
-    up = np.cos(np.pi * (np.arange(height) + 0.5) / height)[:, None]
-    around = 2 * np.pi * ((np.arange(2 * height) + 0.5) / (2 * height) - 0.5)
-    flat = np.sqrt(1 - up**2)
-    directions = np.stack(np.broadcast_arrays(flat * np.sin(around), up, -flat * np.cos(around)), axis=-1)
+    directions = texel_directions(64, 128)
     towards = np.array([-0.55, 0.75, -0.35])
     cosine = np.clip(directions @ (towards / np.linalg.norm(towards)), 0, 1)
     with np.errstate(under="ignore"):
         lobe = np.where(cosine > 0.5, cosine, 0.0) ** 40
-    sky = 0.25 + 0.2 * (0.5 + 0.5 * up[..., None]) * np.array([0.85, 1.0, 1.25])
+    sky = 0.25 + 0.2 * (0.5 + 0.5 * directions[..., 1:2]) * np.array([0.85, 1.0, 1.25])
     return Environment.image((sky + lobe[..., None] * np.array([12.0, 11.0, 9.5])).astype(np.float32))
 
 

@@ -406,6 +406,11 @@ def _unpacked(file: GltfFile, tree: Json) -> Json:
     return {**tree, "buffers": [first, *tree["buffers"][1:]]}
 
 
+def glb_bytes(tree: Json, binary: bytes) -> bytes:
+    """Contents of a .glb file of a JSON and its one buffer."""
+    return _packed(GltfFile(Path("scene.glb"), tree, _binary_chunk(binary)), tree)
+
+
 def _packed(file: GltfFile, tree: Json) -> bytes:
     chunks = file.chunks
     if not chunks:
