@@ -11,7 +11,7 @@ from translucent.diffusion.cache import FieldCache, ground_map
 from translucent.diffusion.entering import environment_parts, even_directions, opaque_surfaces, suns_of
 from translucent.diffusion.exchange import GroundPoints
 from translucent.diffusion.field import DiffusingBody
-from translucent.diffusion.lit_body import lit_body
+from translucent.diffusion.lit_body import lit_body, may_light
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning.plan import plan
@@ -51,6 +51,30 @@ def test_nothing_is_seen_of_a_white_ground_and_a_lossless_body_in_uniform_light(
         np.testing.assert_allclose(found.leaving, free.leaving, rtol=tolerance)
     gray = tl.Scene([ball, ground(0.5)], CAMERA, environment=WHITE)
     assert solver(gray).field(gray, 0).leaving.mean() < 0.9 * free.leaving.mean()
+
+
+def test_nothing_is_seen_of_lossless_bodies_beside_each_other() -> None:
+    """In uniform light each sends the other what it keeps from it, to and fro in the gap, and by a white ground."""
+    ball = tl.Object(Sphere(radius=0.5, center=(-0.52, 0.0, 0.0)).tessellate(24), LOSSLESS)
+    block = tl.Object(Box((0.02, -0.5, -0.5), (1.0, 0.5, 0.5)).tessellate(), LOSSLESS)
+
+    def leaving(*objects: tl.Object) -> list[Array]:
+        scene = tl.Scene(objects, CAMERA, environment=WHITE)
+        return [one.leaving for one in FieldCache().of(plan(scene, scattering=Diffusion(12))).surfaces.values()]
+
+    alone = leaving(ball) + leaving(block)
+    for around in ((), (ground(1.0, -0.52),)):
+        for found, free in zip(leaving(ball, block, *around), alone, strict=True):
+            assert np.abs((found / free).mean(axis=0) - 1.0).max() < 0.025
+            assert np.sqrt(((found / free - 1.0) ** 2).mean()) < 0.04
+
+
+def test_a_body_in_another_one_does_not_receive_its_light_twice() -> None:
+    """What a body around it sends outwards does not reach it."""
+    inner, outer = Sphere(radius=0.4).tessellate(16), Sphere().tessellate(16)
+    shapes = [lit_body(tl.Object(mesh, LOSSLESS), None, 0.2) for mesh in (inner, outer)]
+    assert not may_light(shapes[1], shapes[0])
+    assert may_light(shapes[0], shapes[1])
 
 
 def test_a_ground_lights_a_body_from_below() -> None:

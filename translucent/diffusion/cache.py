@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from threading import Lock
 
 import numpy as np
 
 from translucent.arrays import Array, Integers
-from translucent.diffusion.entering import bounding_ball, opaque_surfaces, radiance_without_suns
+from translucent.diffusion.entering import Occluders, bounding_ball, opaque_surfaces, radiance_without_suns
 from translucent.diffusion.environment_ahead import behind_body
 from translucent.diffusion.exchange import BodyHits, GroundMap, GroundPoints, OpaqueSurfaces
-from translucent.diffusion.field import DiffusingBody, DiffusionField
+from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_by_each_other
 from translucent.diffusion.keys import (
     coefficients_of,
     diffusing_media,
@@ -30,7 +31,7 @@ from translucent.diffusion.lit_body import (
     body_shape,
     inclusion_colors,
     inclusions_of,
-    lit_body,
+    may_light,
     own_frame,
 )
 from translucent.diffusion.photons import EnteringPhotons, FineCells, photons_in_media
@@ -108,18 +109,23 @@ class FieldCache:
         def make() -> Fields:
             places = tuple(opaque_key(item) for item in scene.opaque)
             opaque = kept(self._opaque, places, lambda: opaque_surfaces(scene.opaque), 1)
-            surfaces, volumes, lit = {}, {}, {}
-            bent = self._bent(plan)
-            for i, medium in diffusing_media(scene).items():
-                body = scene.objects[i]
-                if treatment_of(body) is Treatment.DIFFUSION:
-                    own = self._body(body, medium, places, opaque, diffusion)
-                    field = own.field(scene, i, bent.entering.get(i), bent.stops.get(i))
-                    surfaces[i] = replace(field, behind=behind_body(scene.environment, medium, body.mean_thickness))
-                    lit[i] = own.lit
-                else:
-                    volumes[i] = self._volume(body, medium, diffusion).field(scene, bent.volumes.get(i))
-            return Fields(surfaces, volumes, ground_map(scene, lit, surfaces))
+            media, bent = diffusing_media(scene), self._bent(plan)
+            solid = [i for i in media if treatment_of(scene.objects[i]) is Treatment.DIFFUSION]
+            bodies, others = self._bodies_of(scene, {i: media[i] for i in solid}, places, opaque, diffusion)
+            alone = {i: own.solved(scene, i, bent.entering.get(i), bent.stops.get(i)) for i, own in bodies.items()}
+            surfaces = {
+                i: replace(
+                    bodies[i].field_of(found),
+                    behind=behind_body(scene.environment, media[i], scene.objects[i].mean_thickness),
+                )
+                for i, found in lit_by_each_other(bodies, others, alone).items()
+            }
+            volumes = {
+                i: self._volume(scene.objects[i], medium, diffusion).field(scene, bent.volumes.get(i))
+                for i, medium in media.items()
+                if i not in bodies
+            }
+            return Fields(surfaces, volumes, ground_map(scene, {i: own.lit for i, own in bodies.items()}, surfaces))
 
         with self._lock:
             return kept(self._scenes, key, make, KEPT_SCENES)
@@ -147,20 +153,36 @@ class FieldCache:
             ):
                 store.clear()
 
-    def _body(
-        self, body: Object, medium: Medium, places: Hashable, opaque: OpaqueSurfaces | None, diffusion: Diffusion
-    ) -> DiffusingBody:
-        roughness, own = roughness_of(body), own_frame(body)
-        step, inner = diffusion.cell_size(own), inclusions_of(body, () if opaque is None else opaque.objects)
-        shape_key = place_of(own), body.density, step, tuple(place_of(item) for item in inner)
-        shape = kept(self._shapes, shape_key, lambda: body_shape(own, step, inner), KEPT_BODIES)
-        colors = inclusion_colors(shape.grid, inner)
-        lit = kept(
-            self._bodies,
-            (place_of(body), shape_key, places),
-            lambda: lit_body(body, opaque, step, shape),
-            KEPT_BODIES,
-        )
+    def _bodies_of(
+        self,
+        scene: Scene,
+        media: Mapping[int, Medium],
+        places: Hashable,
+        opaque: OpaqueSurfaces | None,
+        diffusion: Diffusion,
+    ) -> tuple[dict[int, DiffusingBody], dict[int, tuple[int, ...]]]:
+        """Bodies with surfaces, by number, and the numbers of those that light each."""
+        objects, inside = scene.objects, () if opaque is None else opaque.objects
+        inner = {i: inclusions_of(objects[i], inside) for i in media}
+        alone = {i: LitBody(self._shape(objects[i], inner[i], diffusion), Occluders(objects[i], opaque)) for i in media}
+        others = {i: tuple(k for k in alone if k != i and may_light(alone[k], alone[i])) for i in alone}
+        bodies = {}
+        for i, medium in media.items():
+            around = tuple((place_of(objects[k]), alone[k].shape) for k in others[i])
+            key = place_of(objects[i]), alone[i].shape, places, around
+            make = partial(replace, alone[i], others=tuple(alone[k] for k in others[i]))
+            lit = kept(self._bodies, key, make, KEPT_BODIES)
+            bodies[i] = self._body(lit, medium, inclusion_colors(lit.grid, inner[i]), diffusion)
+        return bodies, others
+
+    def _shape(self, body: Object, inner: tuple[Object, ...], diffusion: Diffusion) -> BodyShape:
+        own = own_frame(body)
+        step = diffusion.cell_size(own)
+        key = place_of(own), body.density, step, tuple(place_of(item) for item in inner)
+        return kept(self._shapes, key, lambda: body_shape(own, step, inner), KEPT_BODIES)
+
+    def _body(self, lit: LitBody, medium: Medium, colors: Array, diffusion: Diffusion) -> DiffusingBody:
+        shape, roughness = lit.shape, roughness_of(lit.casters.body)
 
         def make() -> BodySystem:
             return BodySystem(
@@ -174,7 +196,7 @@ class FieldCache:
                 warm_starts=self._warm_starts,
             )
 
-        system = kept(self._systems, (shape_key, medium, roughness, colors.tobytes()), make, KEPT_BODIES)
+        system = kept(self._systems, (shape, medium, roughness, colors.tobytes()), make, KEPT_BODIES)
         return DiffusingBody(lit, medium, roughness, system)
 
     def _volume(self, body: Object, medium: Medium, diffusion: Diffusion) -> DiffusingVolume:

@@ -51,15 +51,18 @@ def light_passed(bodies: Sequence[Object], points: Array, directions: Array, dis
 
 def sky_paths(body: Object, points: Array, directions: Array, visible: Mask) -> sparse.csr_array:
     """(s, k): metres in another body from points (s, 3) in unit directions (k, 3) that are `visible`."""
-    center, radius = bounding_ball(body)
-    towards = center - points
-    along = towards @ directions.T
-    near = (towards**2).sum(axis=1)[:, None] - along**2 <= radius**2
-    within = (towards**2).sum(axis=1) <= radius**2
-    sample, direction = np.nonzero(visible & near & ((along > 0.0) | within[:, None]))
+    sample, direction = np.nonzero(visible & may_hit(body, points, directions))
     metres = path_inside(body, points[sample], directions[direction], np.full(len(sample), np.inf))
     crossed = metres > 0.0
     return sparse.csr_array((metres[crossed], (sample[crossed], direction[crossed])), visible.shape)
+
+
+def may_hit(body: Object, points: Array, directions: Array) -> Mask:
+    """(s, k): whether rays from points (s, 3) in unit directions (k, 3) hit the ball around a body."""
+    center, radius = bounding_ball(body)
+    towards = center - points
+    along, square = towards @ directions.T, (towards**2).sum(axis=1)[:, None]
+    return np.asarray((square - along**2 <= radius**2) & ((along > 0.0) | (square <= radius**2)))
 
 
 def bounding_ball(body: Object) -> tuple[Array, float]:

@@ -19,7 +19,7 @@ from scipy import sparse
 from scipy.ndimage import convolve1d, map_coordinates
 from scipy.spatial import cKDTree
 
-from translucent.arrays import Array, Integers
+from translucent.arrays import Array, Integers, Mask
 from translucent.diffusion.grid import box_points, plane_points
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.geometry.mesh import Mesh, Triangles, joined
@@ -113,6 +113,39 @@ BodyHits = Callable[[Array, Array], tuple[Array, Integers]]
 
 
 @dataclass(frozen=True, eq=False)
+class SampledSurface:
+    """Surface with samples, on which rays find the nearest one: of a body, or of several together.
+
+    Attributes
+    ----------
+    nearest : BodyHits
+    count : int
+        Of samples.
+    """
+
+    nearest: BodyHits
+    count: int
+
+    @classmethod
+    def of_all(cls, parts: Sequence[SampledSurface], balls: Sequence[tuple[Array, float]]) -> SampledSurface:
+        """Several surfaces, each in a ball with a center and a radius, as one; samples are counted through."""
+        first = np.cumsum([0, *(part.count for part in parts)])
+
+        def nearest(origins: Array, directions: Array) -> tuple[Array, Integers]:
+            distance, sample = np.full(len(origins), np.inf), np.zeros(len(origins), np.int64)
+            for part, (center, radius), offset in zip(parts, balls, first[:-1], strict=True):
+                towards = center - origins
+                along, square = (towards * directions).sum(axis=1), (towards**2).sum(axis=1)
+                may = np.flatnonzero((square - along**2 <= radius**2) & ((along > 0.0) | (square <= radius**2)))
+                found, own = part.nearest(origins[may], directions[may])
+                closer = found < distance[may]
+                distance[may[closer]], sample[may[closer]] = found[closer], offset + own[closer]
+            return distance, sample
+
+        return cls(nearest, int(first[-1]))
+
+
+@dataclass(frozen=True, eq=False)
 class Patches:
     """Patches of opaque surfaces that are visible from the samples of a body, and their own visibility.
 
@@ -126,6 +159,8 @@ class Patches:
         Numbers of pairs of a sample and a direction, as of `Sky`, and the patch that each sees.
     from_body : (p, s) csr_array
         Irradiance of each patch for a unit of flux that leaves each sample.
+    from_others : (p, o) csr_array
+        The same for the samples of other bodies.
     among : (p, p) csr_array
         The same of patches for each other.
     free, directions : (m,) int64, (m, 3) float64
@@ -139,6 +174,7 @@ class Patches:
     pairs: Integers
     patch: Integers
     from_body: sparse.csr_array
+    from_others: sparse.csr_array
     among: sparse.csr_array
     free: Integers
     directions: Array
@@ -150,10 +186,10 @@ class Patches:
         pairs: Integers,
         rays: tuple[Array, Array],
         step: float,
-        body: BodyHits,
-        samples: int,
+        body: SampledSurface,
+        others: SampledSurface,
     ) -> Patches:
-        """Patches that rays (n, 3), (n, 3) of numbered pairs hit before the body; `step` is the side of a cell."""
+        """Patches that rays (n, 3), (n, 3) of numbered pairs of a body hit; `step` is the side of a cell."""
         origins, directions = rays
         face, distance = surfaces.caster.nearest(origins, directions)
         hit = face >= 0
@@ -166,18 +202,30 @@ class Patches:
         reflected, emitted = surfaces.light(face, points)
         owner, towards = _hemispheres(normals)
         start = (points + _BEFORE * distance[first, None] * normals)[owner]
-        own, sample = body(start, towards)
-        other = surfaces.caster.nearest(start, towards)[1]
-        here, there = np.isfinite(own) & (own < other), np.isfinite(other) & (other <= own)
-        count, weight = len(points), 1.0 / PATCH_RAYS
-        to_body = sparse.csr_array(
-            (np.full(here.sum(), weight), (owner[here], sample[here])), (count, samples), np.float64
+        (own, sample), (other, part) = (surface.nearest(start, towards) for surface in (body, others))
+        opaque = surfaces.caster.nearest(start, towards)[1]
+        there = np.isfinite(opaque) & (opaque <= np.minimum(own, other))
+        here, beside = (own < opaque) & (own <= other), (other < opaque) & (other < own)
+        ends = start[there] + opaque[there, None] * towards[there]
+        nearest = cKDTree(points).query(ends)[1] if there.any() else np.zeros(0, np.int64)
+
+        def factors(rays: Mask, column: Integers, columns: int) -> sparse.csr_array:
+            weight = np.full(len(column), 1.0 / PATCH_RAYS)
+            return sparse.csr_array((weight, (owner[rays], column)), (len(points), columns), np.float64)
+
+        return cls(
+            points,
+            normals,
+            reflected,
+            emitted,
+            pairs,
+            patch,
+            factors(here, sample[here], body.count),
+            factors(beside, part[beside], others.count),
+            factors(there, nearest, len(points)),
+            owner[free := ~here & ~beside & ~there],
+            towards[free],
         )
-        ends = start[there] + other[there, None] * towards[there]
-        nearest = cKDTree(points).query(ends)[1] if count and there.any() else np.zeros(0, np.int64)
-        among = sparse.csr_array((np.full(len(nearest), weight), (owner[there], nearest)), (count, count), np.float64)
-        free = ~here & ~there
-        return cls(points, normals, reflected, emitted, pairs, patch, to_body, among, owner[free], towards[free])
 
     def from_sky(self, radiance: Callable[[Array], Array]) -> Array:
         """(p, 3): irradiance from an environment, whose radiance (m, 3) in directions (m, 3) a function gives."""
@@ -281,11 +329,17 @@ class Exchange:
         Of the opaque surfaces that it sees.
     seen : (s, p) csr_array, optional
         See `Patches.seen`.
+    others : (s, o) csr_array, optional
+        Form factors of the samples of other bodies.
+    behind : (s, o) csr_array, optional
+        The same where no sky is seen behind these: light that they let through does not come along rays.
     """
 
     itself: sparse.csr_array
     patches: Patches | None = None
     seen: sparse.csr_array | None = None
+    others: sparse.csr_array | None = None
+    behind: sparse.csr_array | None = None
 
     @property
     def any(self) -> bool:
@@ -300,10 +354,25 @@ class Exchange:
     def returned(self, leaving: Array, channel: int) -> Array:
         """(s,): flux that enters in a color channel for a flux (s,) that leaves."""
         total = self.itself @ leaving
-        if self.patches is not None and self.seen is not None:
-            first = self.patches.reflected[:, channel] * (self.patches.from_body @ leaving)
-            total = total + self.seen @ self.patches.sent(first, channel)
+        if self.patches is not None:
+            total = total + self._by_patches(self.patches.from_body @ leaving, channel)
         return np.asarray(total)
+
+    def from_others(self, leaving: Array, passing: Array) -> Array:
+        """(s, 3): flux that enters for fluxes (o, 3) that leave other bodies, scattered and unscattered."""
+        total = np.zeros((self.itself.shape[0], 3))
+        if self.others is not None and self.behind is not None:
+            total += self.others @ leaving + self.behind @ passing
+        if self.patches is not None:
+            received = self.patches.from_others @ (leaving + passing)
+            total += np.stack([self._by_patches(received[:, channel], channel) for channel in range(3)], axis=1)
+        return total
+
+    def _by_patches(self, received: Array, channel: int) -> Array:
+        """(s,): flux that enters in a color channel for an irradiance (p,) of the patches."""
+        assert self.patches is not None
+        assert self.seen is not None
+        return np.asarray(self.seen @ self.patches.sent(self.patches.reflected[:, channel] * received, channel))
 
 
 @dataclass(frozen=True, eq=False)

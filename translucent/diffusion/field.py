@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -56,6 +56,12 @@ LEAST_SCATTERED = 0.002
 #: Mean cosine of scattering, at least, of media without an interface whose light is seen by the angle that it turns by
 #: at first events. Behind an interface light enters and leaves in a cone, and that angle is about the same for all.
 DIRECTED = 0.05
+
+#: Fraction of the light of bodies that is too little to go on to others, and the most of it that comes back at once.
+ENOUGH, MOST_AGAIN = 5e-3, 0.9
+
+#: Largest part of all light that counts as added to other light: then its medium does not emit again.
+MOST_PART = 0.99
 
 #: Fraction of a cell that is inside from which all of it is.
 _WHOLE = 1.0 - 1e-9
@@ -269,7 +275,19 @@ class DiffusingBody:
     def field(
         self, scene: Scene, body: int, photons: EnteringPhotons | None = None, stops: RayCaster | None = None
     ) -> DiffusionField:
-        """Subsurface light of the body in a scene, for its environment and lights; `body` is its number.
+        """Subsurface light of the body in a scene; see `solved`."""
+        return self.field_of(self.solved(scene, body, photons, stops))
+
+    @np.errstate(under="ignore")
+    def field_of(self, found: DiffuseSolution) -> DiffusionField:
+        """Subsurface light of a solution."""
+        return _field(self.lit, self._medium, self._roughness, found)
+
+    @np.errstate(under="ignore")
+    def solved(
+        self, scene: Scene, body: int, photons: EnteringPhotons | None = None, stops: RayCaster | None = None
+    ) -> DiffuseSolution:
+        """Light of the body in a scene, for its environment and lights; `body` is its number.
 
         `photons` carry the light that other bodies, whose surfaces are `stops`, refract and reflect; none of it goes
         straight through these.
@@ -302,8 +320,21 @@ class DiffusingBody:
             radiosity = patches.radiosity(self._irradiance(patches, scene, body, suns))
             entering = entering + self._exchange.received(radiosity)
         returned = self._exchange.returned if self._exchange.any else None
-        found = self._system.solved(entering, returned, inside, rays)
-        return _field(self.lit, self._medium, self._roughness, found)
+        return self._system.solved(entering, returned, inside, rays)
+
+    def from_others(self, others: Sequence[DiffuseSolution | None]) -> Array:
+        """(s, 3): flux that enters from `lit.others`, each with its light or none."""
+        sent = [
+            np.zeros((2, body.surface.count, 3)) if one is None else np.stack([one.leaving, one.passing])
+            for one, body in zip(others, self.lit.others, strict=True)
+        ]
+        return self._exchange.from_others(*np.concatenate(sent, axis=1))
+
+    @np.errstate(under="ignore")
+    def lit_by(self, entering: Array, part: float) -> DiffuseSolution:
+        """Light of the body by a flux (s, 3) that enters; `part` is what it is of all light."""
+        returned, inside = self._exchange.returned if self._exchange.any else None, np.zeros((self.lit.grid.count, 3))
+        return self._system.solved(entering, returned, inside, part=part)
 
     def _irradiance(self, patches: Patches, scene: Scene, body: int, suns: Sequence[DirectionalLight]) -> Array:
         """(p, 3): light of lights and environment on patches of opaque surfaces, as far as the body lets it through."""
@@ -397,3 +428,37 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
             polished.reflected, optics.transmittance(np.asarray(medium.absorption) * chord)
         ),
     )
+
+
+@np.errstate(under="ignore")
+def lit_by_each_other(
+    bodies: Mapping[int, DiffusingBody], others: Mapping[int, Sequence[int]], found: Mapping[int, DiffuseSolution]
+) -> dict[int, DiffuseSolution]:
+    """Solutions of bodies, by number, with the light of the `others` that each sees, from those for all other light.
+
+    What bodies receive at first goes on once more (Goral et al. 1984), and the rest in proportion: between two bodies
+    nearly all of it is light that goes to and fro where they are next to each other.
+    """
+    whole = max((float(one.leaving.mean()) for one in found.values()), default=0.0)
+
+    def received(last: Mapping[int, DiffuseSolution]) -> dict[int, Array]:
+        every = {
+            i: body.from_others([last.get(k) for k in others[i]])
+            for i, body in bodies.items()
+            if any(k in last for k in others[i])
+        }
+        return {i: flux for i, flux in every.items() if flux.mean() > ENOUGH * whole}
+
+    def answers(entering: Mapping[int, Array]) -> dict[int, DiffuseSolution]:
+        return {i: bodies[i].lit_by(flux, min(float(flux.mean()) / whole, MOST_PART)) for i, flux in entering.items()}
+
+    first = received(found)
+    total, last = dict(found), answers(first)
+    for i, more in last.items():
+        total[i] = total[i].plus(more)
+    second = received(last)
+    before = max(sum(float(np.vdot(flux, flux)) for flux in first.values()), np.finfo(np.float64).tiny)
+    again = min(sum(float(np.vdot(flux, first[i])) for i, flux in second.items() if i in first) / before, MOST_AGAIN)
+    for i, more in answers({i: flux / (1.0 - again) for i, flux in second.items()}).items():
+        total[i] = total[i].plus(more)
+    return total

@@ -13,8 +13,18 @@ from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask
 from translucent.diffusion.densities import Densities, densities
-from translucent.diffusion.entering import BEFORE, Occluders, Pose, Sky, sky_of, sky_paths, transfer
-from translucent.diffusion.exchange import Exchange, OpaqueSurfaces, Patches
+from translucent.diffusion.entering import (
+    BEFORE,
+    Occluders,
+    Pose,
+    Sky,
+    bounding_ball,
+    may_hit,
+    sky_of,
+    sky_paths,
+    transfer,
+)
+from translucent.diffusion.exchange import Exchange, OpaqueSurfaces, Patches, SampledSurface
 from translucent.diffusion.first_events import EnteringRays
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.sides import SurfaceSides
@@ -26,6 +36,12 @@ from translucent.scene.scene import Object
 
 #: Samples of a surface for each one at which paths through other bodies are found.
 SAMPLES_FOR_PATH = 4
+
+#: Form factor of a body, seen from the middle of another one, below which it does not light that one.
+LEAST_FACTOR = 0.01
+
+#: Samples of a body, most of which are inside of another one that is around it.
+INSIDE = 7
 
 #: Samples of inclusions that a cell near them takes the mean of, and their largest distance in cells.
 AROUND_CELL, REACH = 8, 3.0
@@ -125,12 +141,15 @@ class LitBody:
     ----------
     shape : BodyShape
     casters : Occluders
+    others : tuple of LitBody
+        Other bodies whose light it receives.
     arriving : OrderedDict
         Uniform flux (s, 3) and rays that enter from the last environment, and from each of the last lights, by keys.
     """
 
     shape: BodyShape
     casters: Occluders
+    others: tuple[LitBody, ...] = ()
     arriving: OrderedDict[Hashable, tuple[Array, EnteringRays]] = field(default_factory=OrderedDict)
     _entrances: dict[tuple[float, float], Entrance] = field(default_factory=dict)
     _sky_paths: dict[tuple[Mesh, bytes], sparse.csr_array] = field(default_factory=dict)
@@ -189,14 +208,44 @@ class LitBody:
         return hidden
 
     @cached_property
+    def _seen(self) -> tuple[Integers, Integers]:
+        """Pairs (k,) of `Sky` in which another body is, before all else, and its sample, counted through all others."""
+        if not self.others:
+            return np.zeros(0, np.int64), np.zeros(0, np.int64)
+        sky, starts, directions = self.shape.sky, self._starts, self.pose.outwards(self.shape.sky.directions)
+        near = np.zeros((len(starts), len(directions)), bool)
+        for other in self.others:
+            near |= may_hit(other.casters.body, starts, directions)
+        pairs = np.flatnonzero(near[sky.sample, sky.direction])
+        distance, part = self._all_others.nearest(starts[sky.sample[pairs]], directions[sky.direction[pairs]])
+        first = distance < sky.distance[pairs]
+        pairs, distance, part = pairs[first], distance[first], part[first]
+        blocked = np.flatnonzero(self._hidden[pairs])
+        if self.casters.opaque is not None and len(blocked):
+            opaque, of = self.casters.opaque.caster, pairs[blocked]
+            before = opaque.distances(starts, directions, sky.sample[of], sky.direction[of]) < distance[blocked]
+            pairs, part = (np.delete(one, blocked[before]) for one in (pairs, part))
+        return pairs, part
+
+    @cached_property
+    def _all_others(self) -> SampledSurface:
+        return SampledSurface.of_all(
+            [body.surface for body in self.others], [bounding_ball(body.casters.body) for body in self.others]
+        )
+
+    @property
+    def surface(self) -> SampledSurface:
+        """Its samples, for rays of the world."""
+        return SampledSurface(self.nearest, len(self.grid.points))
+
+    @cached_property
     def patches(self) -> Patches | None:
         """Patches of opaque surfaces that the samples see; None if there are none."""
         if self.casters.opaque is None or not self._hidden.any():
             return None
-        sky, pairs = self.shape.sky, np.flatnonzero(self._hidden)
+        sky, pairs = self.shape.sky, np.setdiff1d(np.flatnonzero(self._hidden), self._seen[0], assume_unique=True)
         rays = self._starts[sky.sample[pairs]], self.pose.outwards(sky.directions)[sky.direction[pairs]]
-        step, samples = self.grid.cells.step, len(self.grid.points)
-        return Patches.of(self.casters.opaque, pairs, rays, step, self.nearest, samples)
+        return Patches.of(self.casters.opaque, pairs, rays, self.grid.cells.step, self.surface, self._all_others)
 
     def nearest(self, origins: Array, directions: Array) -> tuple[Array, Integers]:
         """Distance (k,) at which rays (k, 3), (k, 3) of the world hit the body, inf for none, and the sample there."""
@@ -214,21 +263,35 @@ class LitBody:
 
     def exchange(self, ior: float, roughness: float) -> Exchange:
         """Flux that enters the body for flux that leaves it, through an interface with this index and roughness."""
-        entrance, patches = self.entrance(ior, roughness), self.patches
-        if patches is None:
-            return Exchange(entrance.itself)
-        seen = patches.seen(self.shape.sky.sample, entrance.transfer, len(self.grid.points))
-        return Exchange(entrance.itself, patches, seen)
+        entrance, patches, sky, samples = (
+            self.entrance(ior, roughness),
+            self.patches,
+            self.shape.sky,
+            len(self.grid.points),
+        )
+        seen = None if patches is None else patches.seen(sky.sample, entrance.transfer, samples)
+        pairs, part = self._seen
+        if not len(pairs):
+            return Exchange(entrance.itself, patches, seen)
+        # The environment's light that others let through comes along rays already.
+        behind = self._hidden[pairs] | np.isfinite(sky.distance[pairs])
+        shape = samples, self._all_others.count
+        others, behind = (
+            sparse.csr_array((entrance.transfer[used] / np.pi, (sky.sample[used], at)), shape)
+            for used, at in ((pairs, part), (pairs[behind], part[behind]))
+        )
+        return Exchange(entrance.itself, patches, seen, others, behind)
 
     def entrance(self, ior: float, roughness: float) -> Entrance:
         """Transfer through an interface with this index and roughness; the last one is cached."""
-        free, hidden = self.shape.entrance(ior, roughness), self._hidden
-        if not hidden.any():
+        free, hidden, (seen, _) = self.shape.entrance(ior, roughness), self._hidden, self._seen
+        if not hidden.any() and not len(seen):
             return free
         if (ior, roughness) not in self._entrances:
-            sky, itself = self.shape.sky, free.itself.copy()
+            sky, itself, other = self.shape.sky, free.itself.copy(), np.zeros(len(hidden), bool)
             received = np.where(hidden, 0.0, free.received)
-            itself.data[hidden[sky.facing]] = 0.0
+            other[seen] = True
+            itself.data[(hidden | other)[sky.facing]] = 0.0
             self._entrances.clear()
             self._entrances[ior, roughness] = Entrance(free.transfer, received, itself)
         return self._entrances[ior, roughness]
@@ -261,9 +324,16 @@ def inclusion_colors(grid: BodyGrid, opaque: Sequence[Object]) -> Array:
     return np.array([item.base_color for item in opaque])[grid.inclusions.owner]
 
 
-def lit_body(body: Object, opaque: OpaqueSurfaces | None, step: float, shape: BodyShape | None = None) -> LitBody:
-    """Geometry of a body with cells of this side, shadowed by itself and by opaque surfaces.
+def lit_body(body: Object, opaque: OpaqueSurfaces | None, step: float) -> LitBody:
+    """Geometry of a body with cells of this side, shadowed by itself and by opaque surfaces."""
+    return LitBody(body_shape(own_frame(body), step), Occluders(body, opaque))
 
-    `shape` is that of its own frame, where it is known.
-    """
-    return LitBody(shape or body_shape(own_frame(body), step), Occluders(body, opaque))
+
+def may_light(other: LitBody, body: LitBody) -> bool:
+    """Whether a body is large enough as another one sees it, and not around that one."""
+    (middle, radius), (center, _) = bounding_ball(other.casters.body), bounding_ball(body.casters.body)
+    if radius**2 < LEAST_FACTOR * ((middle - center) ** 2).sum():
+        return False
+    points = body.grid.points[:: len(body.grid.points) // INSIDE + 1]
+    places = body.pose.outwards(points) + body.pose.shift
+    return float(np.median([abs(other.casters.body.winding_number(place)) for place in places])) < 0.5

@@ -15,7 +15,7 @@ optimization"; Haskell et al. 1994 for the condition at the surface; Grosjean 19
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Protocol
 
@@ -209,6 +209,9 @@ def _balance(grid: BodyGrid, d: Array, absorbed: Array, lost: Array) -> Array:
 #: Largest number of times that light of the body falls on the body again, and the change at which it is enough.
 MOST_BOUNCES, ENOUGH = 24, 1e-3
 
+#: Largest change at which a small part of the light is good enough.
+MOST_MISSED = 0.1
+
 #: Largest fraction of the light that may return to the surface; at that one, a hundred times as much is to come.
 MOST_RETURNED = 0.99
 
@@ -244,6 +247,8 @@ class DiffuseSolution:
         Mean direction of that light, inside; shorter than 1 where it comes from several.
     leaving : (s, 3) float64
         Flux that leaves the samples: what has been in the body, and what its surface mirrors.
+    passing : (s, 3) float64
+        Uniform light that leaves the samples without an event.
     scattered : (s, 3) float64
         Fraction of the paths through the body from each sample on which uniform light is scattered.
     steps : int
@@ -257,8 +262,22 @@ class DiffuseSolution:
     cosine: Array
     travel: Array
     leaving: Array
+    passing: Array
     scattered: Array
     steps: int
+
+    def plus(self, more: DiffuseSolution) -> DiffuseSolution:
+        """Solution for the light of both."""
+        own, other = self.entering.sum(axis=1), more.entering.sum(axis=1)
+        total = np.maximum(own + other, _TINY)
+        inverse = (own / (self.cosine + 0.5) + other / (more.cosine + 0.5)) / total
+        names = ("fluence", "entering", "inside", "at_inclusions", "leaving", "passing", "steps")
+        return replace(
+            self,
+            cosine=np.where(inverse > 0.0, 1.0 / np.where(inverse > 0.0, inverse, 1.0) - 0.5, UNIFORM_COSINE),
+            travel=(own[:, None] * self.travel + other[:, None] * more.travel) / total[:, None],
+            **{name: getattr(self, name) + getattr(more, name) for name in names},
+        )
 
 
 class Returned(Protocol):
@@ -333,7 +352,13 @@ class BodySystem:
 
     @np.errstate(under="ignore")
     def solved(
-        self, entering: Array, returned: Returned | None, inside: Array, rays: Sequence[EnteringRays] = ()
+        self,
+        entering: Array,
+        returned: Returned | None,
+        inside: Array,
+        rays: Sequence[EnteringRays] = (),
+        *,
+        part: float = 1.0,
     ) -> DiffuseSolution:
         """Light at the body's surface.
 
@@ -346,6 +371,9 @@ class BodySystem:
         inside : (cells, 3)
             Power of lights inside each cell, in W.
         rays : sequence of EnteringRays
+        part : float
+            What this light is of all light, if it is added to other light: it is solved for less precisely, and the
+            medium does not emit again.
 
         Raises
         ------
@@ -353,7 +381,7 @@ class BodySystem:
             If the solver does not get there.
         """
         fluence, flux, cells = np.zeros_like(entering), entering.copy(), np.zeros_like(inside)
-        scattered, leaving = np.ones_like(entering), np.zeros_like(entering)
+        scattered, leaving, passing = np.ones_like(entering), np.zeros_like(entering), np.zeros_like(entering)
         count = 0 if self._grid.inclusions is None else len(self._grid.inclusions.points)
         inclusions = np.zeros((count, 3))
         steps, ray = 0, joined_rays(rays)
@@ -368,15 +396,17 @@ class BodySystem:
                 emission,
                 straight,
                 self._warm_starts,
+                part,
             )
             fluence[:, channel], flux[:, channel], leaving[:, channel], cells[:, channel], taken = found
+            passing[:, channel] = (1.0 - system.scattered) * (flux[:, channel] - straight.flux)
             inclusions[:, channel] = system.at_inclusions(cells[:, channel], flux[:, channel], straight)
             scattered[:, channel] = system.scattered
             steps += taken
         total, directed = flux.sum(axis=1), ray.entering.sum(axis=1)
         cosine = _mean_cosine(total, directed, path)
         travel = _mean_direction(total, directed, path, self._grid.face_normals)
-        return DiffuseSolution(fluence, flux, cells, inclusions, cosine, travel, leaving, scattered, steps)
+        return DiffuseSolution(fluence, flux, cells, inclusions, cosine, travel, leaving, passing, scattered, steps)
 
 
 def _mean_cosine(flux: Array, directed: Array, path: EntryPaths) -> Array:
@@ -591,12 +621,15 @@ class _ChannelSystem:
         emission: float,
         straight: _DirectionalEffects,
         warm_starts: bool,
+        part: float,
     ) -> tuple[Array, Array, Array, Array, int]:
         """Fluence, flux that enters and that leaves at the samples, fluence in the cells, and steps.
 
         Light of the body falls on it again, as `returned` says of a flux that leaves, until little changes.
         """
-        emitted_inside, emitted, unscattered = self._emitted(emission) if emission > 0.0 else (0.0, 0.0, 0.0)
+        emitted_inside, emitted, unscattered = (
+            self._emitted(emission) if part == 1.0 and emission > 0.0 else (0.0, 0.0, 0.0)
+        )
         inside = self._albedo * power + straight.power
         # What walls emit themselves is known to the cells alone.
         walls = self._walls.any and emission == 0.0
@@ -627,7 +660,8 @@ class _ChannelSystem:
             return entering + returned(leaving(fluence, flux) + (1.0 - self.scattered) * flux)
 
         near, flux, steps = self._cells.even(source(entering)), entering, 0
-        before, tolerance = np.zeros_like(entering), TOLERANCE
+        before, last = np.zeros_like(entering), min(TOLERANCE / part, FIRST)
+        tolerance = last
         if returned is not None:
             flux, tolerance = received(at_surface(near, entering), entering), FIRST
         for _ in range(MOST_BOUNCES):
@@ -642,12 +676,12 @@ class _ChannelSystem:
             flux = np.maximum(flux + change / (1.0 - again), 0.0)
             most = np.abs(flux + straight.flux).max(initial=0.0)
             largest = np.abs(change).max(initial=0.0)
-            if tolerance == TOLERANCE and largest <= ENOUGH * (1.0 - again) * most:
+            if tolerance == last and largest <= min(ENOUGH / part, MOST_MISSED) * (1.0 - again) * most:
                 break
-            tolerance = min(max(OF_CHANGE * largest / max(most, np.finfo(np.float64).tiny), TOLERANCE), FIRST)
+            tolerance = min(max(OF_CHANGE * largest / max(most, np.finfo(np.float64).tiny), last), FIRST)
             before = change if again == 0.0 else np.zeros_like(entering)
         # Emitted light leaves at each angle as what is scattered of uniform light does: with as much that enters.
-        even = emitted / np.maximum(self._uniform[1], _TINY) if emission > 0.0 else 0.0
+        even = emitted / np.maximum(self._uniform[1], _TINY) if part == 1.0 and emission > 0.0 else 0.0
         return (
             fluence,
             flux + straight.flux + even,

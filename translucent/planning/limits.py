@@ -307,14 +307,13 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
         notes.append(Note(NoteKind.SPREAD_INSIDE, text))
     if bodies := [body for body in scene.bodies if treatment_of(body) is Treatment.DIFFUSION]:
         text = (
-            f"{object_names(bodies)}: without light of the environment that other bodies scatter onto these bodies, "
-            "and without details smaller than a cell of the diffusion grid: spikes and edges are up to 15 % too "
-            "dark"
+            f"{object_names(bodies)}: without details smaller than a cell of the diffusion grid: spikes and edges are "
+            "up to 15 % too dark"
         )
         if scene.lights:
             text += "; where lights shine from behind, bodies are up to 45 % too dark"
-        if len(scene.bodies) > 1:
-            text += "; a body next to another body is up to 10 % too dark"
+        if rest := [body for body in scene.bodies if body not in bodies]:
+            text += f"; up to 10 % too dark next to {object_names(rest)}, whose light does not reach these bodies"
         ahead = [body.medium is not None and body.medium.anisotropy >= STRONGLY_AHEAD for body in bodies]
         if any(ahead) and scene.environment.kind == "image":
             text += "; bright parts of the environment, scattered forward by the bodies, are up to 10 % wrong"
