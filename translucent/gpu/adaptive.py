@@ -333,7 +333,7 @@ def _left_out(job: FrameJob, *, mirror: bool, needed: tuple[PassName, ...]) -> t
     features = job.features
     # Of what the ground mirrors, media without an interface may absorb some.
     dims = mirror and any(not (body.has_interface or body.covers) for body in job.scene.bodies)
-    if job.plan.ordered or features.emits or features.scatters or not features.one_interface or dims:
+    if features.emits or features.scatters or not features.one_interface or dims:
         return _DONE
     return tuple(step.name for step in job.plan.passes if step.name not in needed)
 

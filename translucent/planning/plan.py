@@ -77,7 +77,7 @@ from translucent.planning.render_plan import Capabilities, MapPlan, RenderPlan
 from translucent.planning.rendered import Treatment, darkened, occluder_scene, occluders, straight_scene, treatment_of
 from translucent.planning.request import RenderRequest
 from translucent.planning.scattering import Scattering, SingleScattering, Treatments, choose_treatments, rendered_scene
-from translucent.planning.shadow_maps import ShadowMaps, shadow_passes, shadows_left_out
+from translucent.planning.shadow_maps import ShadowMaps, shadow_passes, shadows_left_out, usual_maps
 from translucent.scene.lights import SPREADS, AreaLight, PositionalLight, SpotLight, with_points
 from translucent.scene.scene import Object, Scene, check_scene, object_names
 
@@ -490,11 +490,12 @@ def _with_shadows(found: RenderPlan, scene: Scene, machine: Capabilities) -> Ren
         unmodelled = [*shadows_left_out(machine.texture_units)]
     if not before and not behind:
         return found
+    shadows, narrow = (found.request.shadows, ()) if found.request.shadows or not before else usual_maps(scene)
     return replace(
         found,
         passes=(*before, *behind, *found.passes),
-        unmodelled=(*found.unmodelled, *unmodelled),
-        shadows=found.request.shadows or ShadowMaps(),
+        unmodelled=(*found.unmodelled, *unmodelled, *narrow),
+        shadows=shadows or ShadowMaps(),
         maps=_map_plans(scene, found, machine) if before else (),
     )
 
@@ -504,8 +505,11 @@ def _map_plans(scene: Scene, found: RenderPlan, machine: Capabilities) -> tuple[
 
     They are kept until objects change: lights and cameras do more often.
     """
-    # Where all bodies are drawn as sheets, these throw the shadows, too.
+    # Where all bodies are drawn as sheets, these throw the shadows, too. No validity is kept of shadows: a sum will do
+    # where intervals would only tell which pixels are wrong.
     method = found.method if found.method.makes_sheets else None
+    if method is None and scene.overlap == "add" and not scene.varies and _undecided_by_sums(scene):
+        method = SignedDepth()
     key = tuple(map(weakref.ref, scene.objects)), scene.overlap, method, found.opaque_to_shadows, machine.shader_storage
     known = _MAPS.get(scene.objects[0])
     if known is None or known[0] != key:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from translucent.arguments import checked
 from translucent.errors import InputError
 from translucent.planning.bodies import count_of, indices, media_differ
@@ -16,6 +18,9 @@ UNITS_WITH_SHADOWS = 20
 
 #: Sizes that make sense: below, shadows are blots; above, no texture holds them.
 LEAST_SIZE, MOST_SIZE = 64, 8192
+
+#: Surfaces on a ray through the bodies, on average, up to which maps are as wide as usual: a texel costs as many.
+MANY_SURFACES = 16.0
 
 
 @checked
@@ -58,6 +63,26 @@ class ShadowMaps:
                 "the value must be a number of directions",
                 "use a value such as 8",
             )
+
+
+def usual_maps(scene: Scene) -> tuple[ShadowMaps, tuple[Note, ...]]:
+    """Shadow maps that nobody requested, and a note where they are narrower because rays cross many surfaces.
+
+    Of all lines through a box of area S, surfaces in it of area A are crossed 2 A / S times on average (Cauchy 1850).
+    """
+    usual = ShadowMaps()
+    low, high = (f([item.bounds[i] for item in scene.bodies], axis=0) for i, f in enumerate((np.min, np.max)))
+    box = 2.0 * float((high - low) @ np.roll(high - low, 1))
+    surfaces, size = 2.0 * sum(item.area for item in scene.bodies) / box if box > 0.0 else 0.0, usual.size
+    while surfaces * size**2 > MANY_SURFACES * usual.size**2 and size > LEAST_SIZE:
+        size //= 2
+    if size == usual.size:
+        return usual, ()
+    text = (
+        f"shadow maps are {size} texels wide instead of {usual.size}, because rays through the bodies cross "
+        f"{surfaces:.0f} surfaces on average; --shadow-size or shadows=tl.ShadowMaps(size=...) changes it"
+    )
+    return ShadowMaps(size), (Note(NoteKind.SHADOWS, text),)
 
 
 def shadows_left_out(units: int) -> tuple[Note, ...]:

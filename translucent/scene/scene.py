@@ -206,12 +206,16 @@ class Object(Frozen):
         """
         if self.sheet_thickness is not None:
             return self.sheet_thickness
-        corners = (self.mesh.vertices @ self.matrix[:3, :3].T)[self.mesh.faces]
         if not self.mesh.diagnosis.sound:
             return 0.25 * float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
-        area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-        volume = abs(self.mesh.volume * float(np.linalg.det(self.matrix[:3, :3])))
-        return 2.0 * volume / float(area.sum())
+        return 2.0 * abs(self.mesh.volume * float(np.linalg.det(self.matrix[:3, :3]))) / self.area
+
+    @cached_property
+    def area(self) -> float:
+        """Area of the surface in square metres."""
+        corners = (self.mesh.vertices @ self.matrix[:3, :3].T)[self.mesh.faces]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return 0.5 * float(np.linalg.norm(across, axis=1).sum())
 
     @property
     def has_holes(self) -> bool:
