@@ -383,6 +383,24 @@ def test_maps_of_shadows_are_planned_for_those_objects_that_end_them() -> None:
     assert plan(scene(body())).maps == ()
 
 
+def test_shadows_of_many_open_surfaces_are_sums_in_narrower_maps() -> None:
+    """Of a picture, lists tell which pixels are wrong; nobody asks of a shadow."""
+    sun, sizes = tl.DirectionalLight((0, -1, 0), 1.0), (1.0, 0.99, 0.98, 0.97, 0.96)
+    vertices = [vertex * size for size in sizes for vertex in OPEN.vertices]
+    faces = [face + 8 * i for i in range(len(sizes)) for face in OPEN.faces]
+    mesh = tl.Mesh(vertices, faces, name="many walls")
+    found = plan(scene(body(mesh=mesh), body(None, x=3), lights=[sun]))
+    assert isinstance(found.method, tl.FragmentLists)
+    drawn = [step.name for step in found.maps[0].passes if step.geometry_passes]
+    assert drawn == ["opaque", "signed_depth", "thin_layer_fallback"]
+    assert found.shadows.size == tl.ShadowMaps().size // 2  # 5 cubes: 8.8 surfaces, as each lacks a face of 12
+    (note,) = (note for note in found.unmodelled if "texels wide" in note)
+    assert "cross 9 surfaces on average" in note
+    asked = plan(scene(body(mesh=mesh), body(None, x=3), lights=[sun]), shadows=tl.ShadowMaps(512))
+    assert asked.shadows.size == 512
+    assert note not in asked.unmodelled
+
+
 def test_shadows_on_a_backdrop_are_as_requested() -> None:
     lit = scene(body(), lights=[tl.DirectionalLight((0, -1, 0), 1.0)])
     assert plan_over_backdrop(lit, shadows=tl.ShadowMaps(256)).shadows == tl.ShadowMaps(256)

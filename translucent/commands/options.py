@@ -670,8 +670,8 @@ class ChoiceOptions:
     shadow_size: int | None = option(
         metavar="N",
         help=(
-            "Number of texels along a side of each light's shadow map, 64 to 8192. Default: 1024. More "
-            "texels make shadow edges sharper."
+            "Number of texels along a side of each light's shadow map, 64 to 8192. Default: 1024, or fewer "
+            "for bodies of very many surfaces. More texels make shadow edges sharper."
         ),
     )
     environment_shadows: int | None = option(

@@ -109,7 +109,8 @@ def plan(
     caustics : Caustics, optional
         Photons from the lights through interfaces onto opaque objects and into fog; None for none.
     shadows : ShadowMaps, optional
-        How to find shadows on opaque objects; a renderer without OpenGL traces them. Default: `ShadowMaps()`.
+        How to find shadows on opaque objects; a renderer without OpenGL traces them. Default: `ShadowMaps()`,
+        or narrower ones for bodies of very many surfaces.
 
     Raises
     ------

@@ -20,7 +20,7 @@ UNITS_WITH_SHADOWS = 20
 LEAST_SIZE, MOST_SIZE = 64, 8192
 
 #: Surfaces on a ray through the bodies, on average, up to which maps are as wide as usual: a texel costs as many.
-MANY_SURFACES = 16.0
+MANY_SURFACES = 8.0
 
 
 @checked
