@@ -131,7 +131,7 @@ def _pixels(item: Object, frame: Frame) -> tuple[Integers, Integers, Mask]:
     """Row and column of the pixel of each vertex of an object, (n,), and whether that pixel shows it."""
     assert frame.scene is not None
     camera, (width, height) = frame.scene.camera, frame.size
-    world = item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+    world = item.world_vertices
     away = world - camera.eye
     ahead = away @ camera.forward
     half_width, half_height = camera.half_extent(frame.size)

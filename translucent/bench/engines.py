@@ -148,7 +148,7 @@ def visible_points(renderer: Renderer, scene: Scene, size: tuple[int, int]) -> V
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TranslucentWarning)
         base = renderer.render(replace(scene, objects=[dark]), size, scattering=SingleScattering())
-    mesh = Mesh(body.mesh.vertices @ body.matrix[:3, :3].T + body.matrix[:3, 3], body.mesh.faces)
+    mesh = Mesh(body.world_vertices, body.mesh.faces)
     hits = camera_hits(mesh, np.eye(4), scene.camera, size)
     _, nearest = np.unique(hits.pixel, return_index=True)
     first = hits.where(nearest[base.coverage.reshape(-1)[hits.pixel[nearest]]])

@@ -340,7 +340,7 @@ def _gvxr() -> Adapter:
             thickness = np.zeros((height, width))
             seconds = 0.0
             for number, item in enumerate(made.bodies):
-                vertices = item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+                vertices = item.world_vertices
                 name = f"{scene.name} {number}"
                 gvxr.makeTriangularMesh(name, vertices.ravel().tolist(), item.mesh.faces.ravel().tolist(), "m")
                 gvxr.addPolygonMeshAsInnerSurface(name)

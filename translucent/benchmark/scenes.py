@@ -96,7 +96,7 @@ class BenchmarkScene:
 
 def _framed(objects: Sequence[Object], environment: Environment, fit: float | None = None, turn: float = 0.6) -> Scene:
     """Objects from the front, a little to the side and above, as large as the picture."""
-    corners = np.concatenate([one.mesh.vertices @ one.matrix[:3, :3].T + one.matrix[:3, 3] for one in objects])
+    corners = np.concatenate([one.world_vertices for one in objects])
     camera = Camera.framing(corners, (1, 1), direction=(-turn, -0.45, -1.0), fov_y=28.0, fit=fit)
     nested = any(one.priority for one in objects)
     return Scene(list(objects), camera, (), environment, "priority" if nested else "add")

@@ -67,7 +67,7 @@ def may_hit(body: Object, points: Array, directions: Array) -> Mask:
 
 def bounding_ball(body: Object) -> tuple[Array, float]:
     """Center and radius of a ball around a body."""
-    corners = body.mesh.vertices @ body.matrix[:3, :3].T + body.matrix[:3, 3]
+    corners = body.world_vertices
     center = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     return center, float(np.sqrt(((corners - center) ** 2).sum(axis=1).max()))
 

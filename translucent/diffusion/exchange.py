@@ -58,10 +58,7 @@ class OpaqueSurfaces:
 
     def __init__(self, objects: Sequence[Object]) -> None:
         self.objects = [item for item in objects if len(item.mesh.faces)]
-        parts: list[Triangles] = [
-            (item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3], item.mesh.faces, None)
-            for item in self.objects
-        ]
+        parts: list[Triangles] = [(item.world_vertices, item.mesh.faces, None) for item in self.objects]
         vertices, faces, _ = joined(parts, "opaque objects")
         self.caster = RayCaster(Mesh(vertices, faces))
         self._corners = np.asarray(vertices)[np.asarray(faces)]

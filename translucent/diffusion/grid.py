@@ -555,7 +555,7 @@ class MatrixPattern:
 
 def _placed(item: Object) -> tuple[Array, npt.NDArray[np.int32]]:
     """Vertices (n, 3) of an object after its transform, and faces (m, 3), counter-clockwise from outside."""
-    corners = item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+    corners = item.world_vertices
     faces = np.asarray(item.mesh.faces, np.int32)
     return corners, faces[:, ::-1] if item.faces_inwards else faces
 

@@ -437,15 +437,11 @@ def _open_egl() -> moderngl.Context:
     return moderngl.create_context(require=REQUIRED, standalone=True, backend="egl", **settings)
 
 
-def _open_window() -> moderngl.Context:
-    return moderngl.create_context(require=REQUIRED)
-
-
-def _open_osmesa() -> moderngl.Context:
-    return moderngl.create_context(require=REQUIRED, context=OSMesaContext())
-
-
-_OPENERS: dict[str, Callable[[], moderngl.Context]] = {"egl": _open_egl, "window": _open_window, "osmesa": _open_osmesa}
+_OPENERS: dict[str, Callable[[], moderngl.Context]] = {
+    "egl": _open_egl,
+    "window": lambda: moderngl.create_context(require=REQUIRED),
+    "osmesa": lambda: moderngl.create_context(require=REQUIRED, context=OSMesaContext()),
+}
 
 
 def _probe() -> int:

@@ -362,7 +362,7 @@ class ShadowOccluders:
         """First corners (m, 3) of the faces of an object, unit normals (m, 3), and their dot products (m,)
         with the directions to the light.
         """
-        vertices = item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+        vertices = item.world_vertices
         first, second, third = (vertices[item.mesh.faces[:, corner]] for corner in range(3))
         normal = np.cross(second - first, third - first)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)

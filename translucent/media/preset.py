@@ -353,11 +353,8 @@ def preset_text(one: Preset) -> str:
     values |= {"note": one.note} if one.note else {}
     values |= {"aliases": list(one.aliases)} if one.aliases else {}
     # JSON's numbers, lists and strings are TOML's.
-    return "\n".join([f"[{one.name}]", *(f"{key} = {_toml(value)}" for key, value in values.items()), ""])
-
-
-def _toml(value: object) -> str:
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    written = {key: json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f") for key, value in values.items()}
+    return "\n".join([f"[{one.name}]", *(f"{key} = {value}" for key, value in written.items()), ""])
 
 
 def _entries(text: str, file: str) -> dict[str, object]:

@@ -164,7 +164,7 @@ def preset(name: str) -> Preset:
     own, wrong = read_own_presets()
     if key in own:
         return own[key]
-    if broken := [error for error in wrong if _is_about(error, key)]:
+    if broken := [error for error in wrong if re.search(rf"\[{key}\]|[/\\]{key}\.toml'", str(error))]:
         raise InputError(f"preset {name!r}", "your own preset of this name cannot be read", str(broken[0]))
     speaking = [one.name for one in _all().values() if _speaks_of(one, key)]
     close = close_names(key, [*_all(), *own]) or close_names(key, known) or speaking
@@ -191,11 +191,6 @@ def _names() -> dict[str, Preset]:
 def _words(one: Preset) -> list[str]:
     parts = (one.name, *one.aliases, one.group, one.kind, one.note, one.source)
     return re.findall(r"\w+", " ".join(parts).lower().replace("_", " "))
-
-
-def _is_about(error: InputError, key: str) -> bool:
-    """True if the error concerns a user preset of this name."""
-    return re.search(rf"\[{key}\]|[/\\]{key}\.toml'", str(error)) is not None
 
 
 def _speaks_of(one: Preset, word: str) -> bool:

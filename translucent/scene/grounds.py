@@ -120,7 +120,7 @@ def _is_smooth(item: Object) -> bool:
 
 def _flat(item: Object) -> Mirror | None:
     """Plane of a flat object; None for others."""
-    corners = item.mesh.vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+    corners = item.world_vertices
     normal, thickness = _plane(item, corners)
     return None if thickness > FLAT else Mirror(item, normal, float(corners[item.mesh.faces[0, 0]] @ normal))
 

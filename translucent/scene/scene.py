@@ -198,6 +198,11 @@ class Object(Frozen):
         middle = self.matrix[:3, :3] @ (0.5 * (low + high)) + self.matrix[:3, 3]
         return np.column_stack([linear, 0.5 + linear @ (center - middle)])
 
+    @property
+    def world_vertices(self) -> Array:
+        """(n, 3): vertices of the mesh in the world, in metres."""
+        return np.asarray(self.mesh.vertices @ self.matrix[:3, :3].T + self.matrix[:3, 3])
+
     @cached_property
     def mean_thickness(self) -> float:
         """Twice the volume over the area, in metres: of a wide slab its thickness, of a ball two thirds of the radius.

@@ -165,7 +165,8 @@ class _Room:
     ) -> None:
         self.channels = 3 if switches["DISPERSION"] else 1
         self.words = _words(switches)
-        self.end_words = _end_words(switches)
+        # Words of the record of an end in shaders/transport/stored_ends.glsl.
+        self.end_words = 16 + bool(switches["MICROFACETS"]) + 4 * bool(switches["TEXTURED"])
         branch = 4 * (self.words + 7)
         most = MOST_BYTES // (2 * branch + (_LIVE_BYTES + 8 * self.end_words) // 2)
         self.places = min(MORE_PLACES * self.channels * len(pixels), most)
@@ -277,11 +278,6 @@ def _words(switches: Mapping[str, bool | int]) -> int:
     interior = 1 if switches["ONE_OBJECT"] else 4
     outwards = 3 if switches["LAYERED"] or switches["DIFFUSED"] else 0
     return 5 + interior + 2 * switches["MICROFACETS"] + outwards + 12 * switches["FOOTPRINTS"]
-
-
-def _end_words(switches: Mapping[str, bool | int]) -> int:
-    """Words of the record of an end in ``shaders/transport/stored_ends.glsl``."""
-    return 16 + bool(switches["MICROFACETS"]) + 4 * bool(switches["TEXTURED"])
 
 
 def pixel_words(requested: npt.NDArray[np.bool_], left: int = 0, top: int = 0) -> Pixels:
