@@ -240,6 +240,13 @@ def block_error(rendered: Array, halves: Array, used: Mask) -> float:
     return math.sqrt(max(noise_free_square(*parts)[0], 0.0)) / mean
 
 
+def nrmse(rendered: Array, halves: Array, used: Mask) -> float:
+    """Root mean square error over some pixels, freed of the truth's noise, as a fraction of the truth's mean."""
+    one, other = halves[:, used].astype(np.float64)
+    square, _ = noise_free_square(rendered[used], one, other)
+    return math.sqrt(max(square, 0.0)) / max(0.5 * float((one + other).mean()), 1e-12)
+
+
 def bias(rendered: Array, halves: Array, used: Mask) -> tuple[float, float, float]:
     """Mean of each channel over some pixels, divided by the truth's, less 1."""
     right = halves[:, used].astype(np.float64).mean(axis=(0, 1))

@@ -11,7 +11,7 @@ from scipy.ndimage import affine_transform, uniform_filter
 
 from translucent.arrays import Array, Mask
 from translucent.bench.judgement import JUST_NOTICEABLE, lab
-from translucent.bench.truth import bias, block_error, noise_free_square
+from translucent.bench.truth import bias, block_error, nrmse
 from translucent.benchmark.truth import TruthPicture
 from translucent.errors import RenderError
 from translucent.extras import require_package
@@ -103,7 +103,7 @@ def score_picture(picture: Array, truth: TruthPicture, thickness: Array | None =
     one, other = (half.astype(np.float64) for half in truth.halves)
     right = truth.radiance
     return Score(
-        nrmse=_nrmse(picture, truth),
+        nrmse=nrmse(picture, truth.halves, used),
         block=block_error(picture, truth.halves, used),
         bias=bias(picture, truth.halves, used),
         flip=flip(picture, right, used),
@@ -113,12 +113,6 @@ def score_picture(picture: Array, truth: TruthPicture, thickness: Array | None =
         thickness=None if thickness is None or truth.thickness is None else score_thickness(thickness, truth.thickness),
         suspicions=tuple(suspicions(picture, truth)),
     )
-
-
-def _nrmse(picture: Array, truth: TruthPicture) -> float:
-    one, other = (half.astype(np.float64)[truth.mask] for half in truth.halves)
-    square, _ = noise_free_square(picture[truth.mask], one, other)
-    return math.sqrt(max(square, 0.0)) / max(0.5 * float((one + other).mean()), 1e-12)
 
 
 def flip(picture: Array, right: Array, used: Mask) -> float:
@@ -210,7 +204,7 @@ def suspicions(picture: Array, truth: TruthPicture) -> list[str]:
     Errors are those of means over blocks, so that noise is not taken for a mistake: an encoding would reduce it.
     Undone are flips, exchanged channels, transfer functions, a wrong exposure, a shift and a zoom (a crop).
     """
-    if _nrmse(picture, truth) < NEAR:
+    if nrmse(picture, truth.halves, truth.mask) < NEAR:
         return []
     if picture.max() <= 0.0:
         return ["black"]
