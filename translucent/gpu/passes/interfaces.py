@@ -8,7 +8,7 @@ import numpy as np
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import FrameJob
-from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
+from translucent.gpu.passes.opaque import bind_light, interface_shadow_switches
 from translucent.gpu.passes.variants import Variants, background_switches, coat_switches, look_switches
 from translucent.gpu.shaders import set_uniform
 from translucent.planning.interfaces import picture_cuts
@@ -183,16 +183,4 @@ class SurfacesPass:
         found = job.targets["result"].color_attachments[:4] + job.targets["entered"].color_attachments
         if not job.features.one_interface:
             found += job.targets["left"].color_attachments
-        environment, resources = job.scene.environment, job.resources
-        textures = {
-            **dict(zip(_SAMPLERS, found, strict=False)),
-            "object_table": table,
-            **resources.light_textures(environment),
-            **resources.background_textures(environment),
-        }
-        if job.features.has_opaque:
-            textures["opaque_axial_depth"], textures["opaque_radiance"] = blurred_opaque(job)
-        if job.diffused_light is not None:
-            textures["diffused_light"] = job.diffused_light.texture
-        self._variants.bind(**textures)
-        resources.shadows.use(self._variants.units)
+        bind_light(job, self._variants, {**dict(zip(_SAMPLERS, found, strict=False)), "object_table": table})

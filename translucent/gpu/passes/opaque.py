@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import moderngl
 import numpy as np
@@ -13,6 +14,7 @@ from translucent.gpu.job import CameraView, FrameJob, TextureBackdrop
 from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
 from translucent.gpu.resources import Resources
 from translucent.gpu.shaders import set_uniform, set_used
+from translucent.gpu.textures import AnyTexture
 from translucent.gpu.uniforms import surface_fields
 from translucent.media.colors import ColorLike
 from translucent.planning.passes import PassSpec
@@ -156,7 +158,7 @@ def set_surface(view: CameraView, program: moderngl.Program, surface: Surface, h
     set_used(program, {name: value.item() if value.ndim == 0 else tuple(value) for name, value in values.items()})
 
 
-def blurred_opaque(job: FrameJob) -> tuple[moderngl.Texture, moderngl.Texture]:
+def _blurred_opaque(job: FrameJob) -> tuple[moderngl.Texture, moderngl.Texture]:
     """Axial depth and radiance of the opaque objects; the latter with its blurs, if a rough body may show them."""
     axial_depth, radiance = job.targets["opaque"].color_attachments
     if job.bending:
@@ -166,6 +168,22 @@ def blurred_opaque(job: FrameJob) -> tuple[moderngl.Texture, moderngl.Texture]:
         radiance.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
         radiance.repeat_x = radiance.repeat_y = False
     return axial_depth, radiance
+
+
+def bind_light(job: FrameJob, variants: Variants, textures: Mapping[str, AnyTexture]) -> None:
+    """Bind textures, and the light that interfaces show: of lights, the environment, opaque objects and diffusion."""
+    environment, resources = job.scene.environment, job.resources
+    found = {
+        **textures,
+        **resources.light_textures(environment),
+        **resources.background_textures(environment),
+    }
+    if job.features.has_opaque:
+        found["opaque_axial_depth"], found["opaque_radiance"] = _blurred_opaque(job)
+    if job.diffused_light is not None:
+        found["diffused_light"] = job.diffused_light.texture
+    variants.bind(**found)
+    resources.shadows.use(variants.units)
 
 
 def _clear(framebuffer: moderngl.Framebuffer) -> None:

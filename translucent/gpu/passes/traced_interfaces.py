@@ -16,7 +16,7 @@ from translucent.formulas.sampling import FOOTPRINT_STEP, MOST_POINTS, sobol_poi
 from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.interfaces import NoInterface
-from translucent.gpu.passes.opaque import blurred_opaque, interface_shadow_switches
+from translucent.gpu.passes.opaque import bind_light, interface_shadow_switches
 from translucent.gpu.passes.ray_generations import Pixels, RayGenerations, all_words
 from translucent.gpu.passes.variants import Variants, background_switches, coat_switches
 from translucent.gpu.placement import Part, extents, part_of
@@ -182,21 +182,10 @@ class TracedInterfacesPass:
     def _bind(self, job: FrameJob, traced: dict[str, moderngl.Texture]) -> None:
         emitted, through, *_ = job.targets["result"].color_attachments
         entered = dict(zip(_ENTERED, job.targets["entered"].color_attachments, strict=True))
-        environment, resources = job.scene.environment, job.resources
-        textures = {
-            **entered,
-            **traced,
-            **resources.light_textures(environment),
-            **resources.background_textures(environment),
-        }
-        if job.features.has_opaque:
-            textures["opaque_axial_depth"], textures["opaque_radiance"] = blurred_opaque(job)
-        if job.diffused_light is not None:
-            textures["diffused_light"] = job.diffused_light.texture
-        self._variants.bind(emitted_radiance_sum=emitted, straight_transmittance=through, **textures)
-        resources.shadows.use(self._variants.units)
-        if resources.shadows.ground is not None:
-            resources.shadows.ground.texture.use(self._variants.units["ground_shadows"])
+        textures = {"emitted_radiance_sum": emitted, "straight_transmittance": through, **entered, **traced}
+        bind_light(job, self._variants, textures)
+        if (ground := job.resources.shadows.ground) is not None:
+            ground.texture.use(self._variants.units["ground_shadows"])
 
 
 def _pixels(job: FrameJob, part: Part, mask: str) -> Pixels:
