@@ -191,16 +191,17 @@ def _ours(name: str, title: str, settings: str, features: frozenset[Feature] = A
 _STRAIGHT = frozenset[Feature]({"absorption", "sheets", "shadows", "emission", "nesting"})
 
 
+def _needs(module: str, package: str = "") -> Callable[[], str]:
+    """Why a renderer cannot run here that is a Python module, of a package that may have another name."""
+    name = package or module
+    return lambda: "" if importlib.util.find_spec(module) else f"{name} is not installed; pip install {name}"
+
+
 # --- Mitsuba ---------------------------------------------------------------------------------------------------------
 
 
 def _mitsuba(paths: int) -> Adapter:
     """Mitsuba 3 with few paths for each pixel."""
-
-    def missing() -> str:
-        if importlib.util.find_spec("mitsuba") is None:
-            return "mitsuba is not installed; pip install mitsuba"
-        return ""
 
     @contextmanager
     def start() -> Iterator[Session]:
@@ -227,7 +228,7 @@ def _mitsuba(paths: int) -> Adapter:
 
     settings = f"volpathmis without a depth limit, {paths} paths per pixel, box filter"
     features = ALL - {"emission", "sheets"}
-    return Adapter(f"mitsuba-{paths}", f"Mitsuba 3, {paths} paths", settings, features, missing, start)
+    return Adapter(f"mitsuba-{paths}", f"Mitsuba 3, {paths} paths", settings, features, _needs("mitsuba"), start)
 
 
 # --- Blender, as a module in a Python of its own ---------------------------------------------------------------------
@@ -308,11 +309,6 @@ _GLTF = frozenset[Feature]({"absorption", "refraction", "roughness", "shadows"})
 def _gvxr() -> Adapter:
     """Adapter of gVirtualXRay, whose L-buffer contains only thickness."""
 
-    def missing() -> str:
-        if importlib.util.find_spec("gvxrPython3") is None:
-            return "gvxr is not installed; pip install gvxr"
-        return ""
-
     @contextmanager
     def start() -> Iterator[Session]:
         try:
@@ -358,7 +354,7 @@ def _gvxr() -> Adapter:
         gvxr.destroyAllWindows()
 
     settings = "L-buffer of each body, one ray per pixel"
-    return Adapter("gvxr", "gVirtualXRay", settings, frozenset({"absorption"}), missing, start)
+    return Adapter("gvxr", "gVirtualXRay", settings, frozenset({"absorption"}), _needs("gvxrPython3", "gvxr"), start)
 
 
 # --- pyrender: alpha blending -----------------------------------------------------------------------------------------
@@ -366,10 +362,6 @@ def _gvxr() -> Adapter:
 
 def _pyrender() -> Adapter:
     """Adapter of the rasterizer pyrender, in which each body has one opacity and one emission."""
-
-    def missing() -> str:
-        found = importlib.util.find_spec("pyrender") is not None
-        return "" if found else "pyrender is not installed; pip install pyrender"
 
     @contextmanager
     def start() -> Iterator[Session]:
@@ -414,7 +406,7 @@ def _pyrender() -> Adapter:
         yield Session(draw, str(pyrender.__version__), "OpenGL")
 
     settings = "alpha blending by the mean thickness of each body, unlit, 8 bits, 16 samples"
-    return Adapter("pyrender", "pyrender", settings, frozenset({"absorption"}), missing, start)
+    return Adapter("pyrender", "pyrender", settings, frozenset({"absorption"}), _needs("pyrender"), start)
 
 
 def _works(mitsuba: Any, variant: str) -> bool:
