@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import moderngl
 import numpy as np
@@ -35,6 +37,9 @@ _MAPS = (
 )
 #: Samplers of ``shaders/shade/opaque_surface.glsl``.
 SURFACE_SAMPLERS = *_MAPS, *TEXTURE_FIELDS
+
+#: Values of the uniforms of ``shaders/shade/opaque_surface.glsl``, of each surface that has been drawn.
+_UNIFORMS: WeakKeyDictionary[Surface, dict[str, Any]] = WeakKeyDictionary()
 
 #: Depth of infinitely far pixels: behind everything, and yet visible.
 _BEHIND_ALL = 0.1 * float(CONSTANTS["NOTHING"])
@@ -154,8 +159,11 @@ def set_surface(view: CameraView, program: moderngl.Program, surface: Surface, h
     view.resources.textures.bind(surface, program, len(_MAPS))
     set_uniform(program, "opaque_hole_below", hole_below)
     # Not all are where an object only emits light, or only its depth is needed.
-    values = {f"opaque_{name}": np.asarray(value, np.float64) for name, value in surface_fields(surface).items()}
-    set_used(program, {name: value.item() if value.ndim == 0 else tuple(value) for name, value in values.items()})
+    if (values := _UNIFORMS.get(surface)) is None:
+        fields = {name: np.asarray(value, np.float64) for name, value in surface_fields(surface).items()}
+        values = {f"opaque_{name}": one.item() if one.ndim == 0 else tuple(one) for name, one in fields.items()}
+        _UNIFORMS[surface] = values
+    set_used(program, values)
 
 
 def _blurred_opaque(job: FrameJob) -> tuple[moderngl.Texture, moderngl.Texture]:
