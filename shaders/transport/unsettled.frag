@@ -1,9 +1,10 @@
-// Pixels whose light from interfaces needs more samples; the others are discarded. After one sample those are whose light differs
-// within 5 x 5 pixels. After several, a pixel needs samples in proportion to the power 2/3 of its standard deviation, as that takes
-// most off the error of the picture for its time (Neyman 1934); the deviation is the mean within 3 x 3 pixels, and relative to the
-// root of the light there. Pixels with the edge of an interface take all samples, as every error of their mean shows. MIRROR: likewise
-// for the light that bodies add to what the ground mirrors, in samples that hit no interface. measures: writes deviations, and
-// discards nothing that differs but edges. Row 0 is the top row.
+// Pixels whose light from interfaces needs more samples; the others are discarded. After one sample those are whose light is not
+// linear within 5 x 5 pixels. After several, those whose standard error shows, deviation n^(-3/4) of n samples, unless they have as
+// many as is worth it: in proportion to the power 4/5 of the deviation, which takes most off the error of the picture for its time
+// (see adaptive.py). The deviation is the mean within 3 x 3 pixels, and relative to the root of the light there; what shows, the larger of it and the pixel's own. Pixels with the edge
+// of an interface take all samples, as every error of their mean shows. MIRROR: likewise for the light that bodies add to what the
+// ground mirrors, in samples that hit no interface. measures: writes deviations, and discards nothing that differs but edges. Row 0 is
+// the top row.
 
 #include <constants>
 #include <View>
@@ -14,7 +15,7 @@ uniform sampler2D bent_spread;     // r: sum of squared luminance; alpha: of the
 uniform sampler2D average_light;   // sum over the samples that hit no interface; alpha: how many these are
 uniform float samples;             // of a pixel
 uniform float most;                // that one may have which shows an interface alone
-uniform float contrast;            // largest range of light near a pixel that one sample is enough for, as a fraction of its mean
+uniform float difference;          // largest second difference of light near a pixel that one sample is enough for, as a fraction of its mean
 uniform float much_lost;           // fraction of a pixel's light whose loss makes it invalid whatever other samples find
 uniform float error;               // standard error that is as good as none, as a fraction of the light
 uniform float wanted;              // samples of a pixel whose deviation is 1
@@ -22,6 +23,14 @@ uniform int first;                 // 1: there is one sample so far
 uniform int measures;
 
 layout(location = 0) out float unsettled;
+
+// Largest second difference of the channels of light across a pixel; a neighbor without light counts as the pixel itself.
+float bend(ivec2 at, ivec2 step, ivec2 last, vec3 mean) {
+    vec4 before = texelFetch(bent_light, clamp(at - step, ivec2(0), last), 0), after = texelFetch(bent_light, clamp(at + step, ivec2(0), last), 0);
+    vec3 off = (before.a > 0.0 ? before.rgb / before.a - mean : vec3(0.0)) + (after.a > 0.0 ? after.rgb / after.a - mean : vec3(0.0));
+    off = abs(off);
+    return max(off.r, max(off.g, off.b));
+}
 
 void main() {
     ivec2 here = ivec2(gl_FragCoord.xy), last = ivec2(frame_size.xy) - 1;
@@ -35,18 +44,15 @@ void main() {
         if (measures == 1) { discard; }
         return;
     }
-    int reach = first == 1 ? 2 : 1;
-    vec3 low = vec3(NOTHING), high = vec3(0.0);
-    float sum = 0.0, count = 0.0, squares = 0.0;
-    for (int y = -reach; y <= reach; ++y) {
-        for (int x = -reach; x <= reach; ++x) {
+    float sum = 0.0, count = 0.0, squares = 0.0, own_variance = 0.0, bends = 0.0;
+    for (int y = -1; y <= 1; ++y) {
+        for (int x = -1; x <= 1; ++x) {
             ivec2 at = clamp(here + ivec2(x, y), ivec2(0), last);
             vec4 light = texelFetch(bent_light, at, 0);
             if (light.a == 0.0) { continue; }
             vec3 mean = light.rgb / light.a;
-            low = min(low, mean);
-            high = max(high, mean);
             float level = luminance(mean);
+            if (first == 1) { bends = max(bends, max(bend(at, ivec2(1, 0), last, mean), bend(at, ivec2(0, 1), last, mean))); }
 #if MIRROR
             vec4 all_light = texelFetch(average_light, at, 0);
             sum += luminance(all_light.rgb) / all_light.a;
@@ -54,15 +60,18 @@ void main() {
             sum += level;
 #endif
             count += 1.0;
-            if (light.a > 1.0) { squares += max(texelFetch(bent_spread, at, 0).r - light.a * level * level, 0.0) / (light.a - 1.0); }
+            if (light.a > 1.0) {
+                float variance = max(texelFetch(bent_spread, at, 0).r - light.a * level * level, 0.0) / (light.a - 1.0);
+                squares += variance;
+                if (at == here) { own_variance = variance; }
+            }
         }
     }
-    vec3 range = high - low;
     if (first == 1) {
-        if (max(range.r, max(range.g, range.b)) <= contrast * sum / count) { discard; }
+        if (bends <= difference * sum / count) { discard; }
         return;
     }
     unsettled = sqrt(squares / max(sum, 1e-30));
-    bool good = squares * count <= taken * error * error * sum * sum;
-    if (measures == 0 && (good || taken >= wanted * pow(unsettled, 2.0 / 3.0))) { discard; }
+    bool good = max(squares, own_variance * count) * count <= pow(taken, 1.5) * error * error * sum * sum;
+    if (measures == 0 && (good || taken >= wanted * pow(unsettled, 0.8))) { discard; }
 }

@@ -45,10 +45,10 @@ def test_the_picture_is_that_of_all_samples(renderer: tl.Renderer, scene: tl.Sce
         np.testing.assert_array_equal(few.arrays[name], every.arrays[name], err_msg=name)
     mean = every.radiance[every.coverage].mean()
     off = (few.radiance - every.radiance)[every.coverage]
-    # Both are 0.009 from the mean of 256 samples.
-    assert np.sqrt(np.square(off, dtype=np.float64).mean()) < 0.009 * mean
+    # The error that does not show; all samples are 0.009 from the mean of 256, and few are 0.013.
+    assert np.sqrt(np.square(off, dtype=np.float64).mean()) < adaptive.ERROR * mean
     assert abs(off.mean(dtype=np.float64)) < 0.002 * mean  # in pixels as coarse as these
-    assert np.abs(off).max() < 0.1 * mean
+    assert np.abs(off).max() < 0.15 * mean
     np.testing.assert_allclose(few.radiance[~every.coverage], every.radiance[~every.coverage], atol=1e-6)
 
 
@@ -157,16 +157,17 @@ def test_rough_interfaces_take_samples_where_they_are_noisy(renderer: tl.Rendere
     inside = every.coverage
     errors = [np.square(frame.radiance - truth.radiance, dtype=np.float64)[inside].mean() for frame in (few, every)]
     assert errors[0] < 1.1 * errors[1]
-    assert traced(few) < 13.0
+    assert traced(few) < 14.0
     off = (few.radiance - every.radiance)[inside].mean(dtype=np.float64)
     assert abs(off) < 0.003 * every.radiance[inside].mean()
 
 
 def test_wanted_samples_leave_the_error_of_the_same_number_everywhere() -> None:
-    """The mean square of sigma / n, with the next power of two half an octave off on average."""
+    """The mean square of sigma n^(-3/4)."""
     deviations = np.exp(np.random.default_rng(3).normal(size=10_000)).astype(np.float32)
-    samples = np.sqrt(2.0) * wanted_samples(deviations, 16) * deviations ** (2 / 3)
-    assert np.mean((deviations / samples) ** 2) == pytest.approx(np.mean((deviations / 16) ** 2), rel=1e-4)
+    samples = wanted_samples(deviations, 16) * deviations**0.8
+    errors = deviations / samples**0.75, deviations / 16**0.75
+    assert np.mean(errors[0] ** 2) == pytest.approx(np.mean(errors[1] ** 2), rel=1e-4)
     assert samples.mean() < 10.0
     assert wanted_samples(np.zeros(4, np.float32), 16) == 0.0
 

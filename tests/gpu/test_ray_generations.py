@@ -17,7 +17,7 @@ from tests.ray_probe import embree_hits, scene_center
 from tests.rays import agreeing, embree_nearest, random_rays
 from translucent.assets import mesh_path
 from translucent.geometry.ray_caster import embree_refusal
-from translucent.geometry.solids import Sphere, Torus
+from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.gpu import embree_hits as module
 from translucent.gpu.embree_hits import EmbreeHits
 from translucent.gpu.passes import ray_generations, traced_interfaces
@@ -124,8 +124,18 @@ def test_portions_are_halved_where_rays_have_no_room(renderer: tl.Renderer, monk
     monkeypatch.setattr(traced_interfaces, "MOST_LIGHT", 7 * SIZE[0])
     monkeypatch.setattr(ray_generations, "PLACES", 1)
     monkeypatch.setattr(ray_generations, "MORE_PLACES", 2)
+    monkeypatch.setattr(ray_generations, "LEAST_PLACES", 1)
     np.testing.assert_array_equal(rendered(renderer, scene, "embree").radiance, whole.radiance)
     assert halves
+
+
+def test_one_pixel_has_room_for_all_its_rays(renderer: tl.Renderer) -> None:
+    """More of them are alive at once than there are places to a pixel on average."""
+    plates = [tl.Object(Box((-1, -1, -z - 0.4), (1, 1, -z)).tessellate(1), tl.Medium(ior=2.0)) for z in (0, 0.5, 1)]
+    camera = tl.Camera.look_at((0.3, 0.1, 5), (0.2, 0.1, 0), fov_y=0.01)
+    scene = tl.Scene(plates, camera, environment=tl.Environment.constant((1, 1, 1)))
+    ours = renderer.render(scene, (1, 1), interfaces=tl.TracedInterfaces(forks=4, hits="embree"))
+    np.testing.assert_allclose(ours.radiance, 1.0, rtol=1e-5)
 
 
 def test_a_body_that_moves_is_hit_where_it_is(renderer: tl.Renderer) -> None:

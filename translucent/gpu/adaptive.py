@@ -25,18 +25,23 @@ from translucent.planning.passes import PassName
 
 Floats = npt.NDArray[np.float32]
 
-#: Of 16 samples: the largest range of light near a pixel that one sample is enough for, and the largest standard error
-#: that is as good as none, both as fractions of the light. With more samples they are smaller. The error is a step of a
-#: picture with 8 bits in the middle of its range, by the slope of the curve of sRGB: (2.4 / (0.5 + 0.055)) / 255.
-CONTRAST, ERROR = 0.05, 0.017
+#: Of 16 samples, the largest standard error that is as good as none, as a fraction of the light: a step of a picture
+#: with 8 bits in the middle of its range, by the slope of the curve of sRGB, (2.4 / (0.5 + 0.055)) / 255. With more
+#: samples it is smaller.
+ERROR = 0.017
 
 #: The same of the light that bodies add to what a ground mirrors, as a fraction of all light of the ground: that is
 #: smooth but for the mirror image, so that less of an error shows.
-MIRROR_CONTRAST, MIRROR_ERROR = 0.01, 0.005
+MIRROR_ERROR = 0.005
+
+#: Second difference of the light of neighbors to the standard error of one sample in the middle of a pixel. An edge
+#: across a pixel has a difference as large as its step. The sample finds the larger side: its mean error is the step
+#: times the smaller part of the pixel, from 0 to 1/2, whose mean square is 1/12. Light that varies linearly has neither.
+DIFFERENCE_TO_ERROR = 12.0**0.5
 
 #: Samples after which deviations are measured, and the most samples of a pixel, in those of the picture. Fewer of the
 #: picture are all taken.
-FIRST_LOOK, MORE = 4, 2
+FIRST_LOOK, MORE = 3, 2
 
 #: Of rough interfaces, a pixel is isolated that is farther from the median of the eight around it than so many spreads
 #: of the 24 around it, and from each of the eight by a fraction of that; and the least spread, as a fraction of the
@@ -63,11 +68,12 @@ class AdaptiveSampling:
     """Averages over samples in two rounds: first the cheap passes for all samples, then ray tracing where pixels need
     it.
 
-    Of n samples at low-discrepancy points the error is about sigma / n, with the standard deviation sigma of a sample.
-    A picture with the error that N samples of each pixel leave takes least time if a pixel has samples in proportion to
-    sigma^(2/3), N (sum sigma^(2/3) / sum sigma^2)^(1/2) sigma^(2/3) (Neyman 1934, "On the two different aspects of the
-    representative method", for an error of sigma / n). Deviations are those of the first samples, relative to the root
-    of the light, between an error of the light and one of its logarithm.
+    Of n samples at low-discrepancy points, a pixel with an edge has an error of about sigma n^(-3/4), with the standard
+    deviation sigma of a sample (Mitchell 1996, "Consequences of stratified sampling in graphics"). Pixels have enough
+    where that does not show. A picture with the error that N samples of each pixel leave takes least time if a pixel
+    has samples in proportion to sigma^(4/5), N (sum sigma^(4/5) / sum sigma^2)^(2/3) sigma^(4/5) (Neyman 1934, "On the
+    two different aspects of the representative method", for that error). Deviations are those of the first samples,
+    relative to the root of the light, between an error of the light and one of its logarithm.
 
     The first round finds for every sample which pixels show an interface, and sums up the light of all others:
     edges are as smooth as ever. The second traces rays; in each pixel, their mean replaces all of its
@@ -110,9 +116,7 @@ class AdaptiveSampling:
             clock.outside()
         job.bending = True
         leave_out = _left_out(job, mirror=job.mirror is not None, needed=_NEEDED)
-        # Settled pixels are left out after these; once a few are there, each time that their number has doubled.
-        most = _most(samples)
-        looks = {1} | {2**i for i in range(2, most.bit_length()) if most > samples}
+        looks = _looks(samples)
         for number, shift in enumerate(_central_first(samples)):
             if not number or number in looks:
                 left = self._find_unsettled(job, samples, number)
@@ -190,15 +194,15 @@ class AdaptiveSampling:
         """Mark the pixels that need more samples than these; returns how many there are."""
         if not job.covered:
             return 0
-        marked = [(("bent", "unsettled"), CONTRAST, ERROR, MUCH_LOST, Part(0, 0, *job.targets.size))]
+        marked = [(("bent", "unsettled"), ERROR, MUCH_LOST, Part(0, 0, *job.targets.size))]
         if job.mirror is not None:
             part = mirrored_part(job, job.mirror)
-            marked.append((("mirrored", "mirror_unsettled"), MIRROR_CONTRAST, MIRROR_ERROR, MIRROR_LOST, part))
-        finer = min(16.0 / samples, 1.0) ** 0.5
+            marked.append((("mirrored", "mirror_unsettled"), MIRROR_ERROR, MIRROR_LOST, part))
+        finer = min(16.0 / samples, 1.0)
         values = {"samples": samples, "most": _most(samples), "first": taken == 1, "wanted": 0.0, "measures": 1}
         own = [
-            {**values, "contrast": finer * contrast, "error": finer * error, "much_lost": lost}
-            for _, contrast, error, lost, _ in marked
+            {**values, "difference": DIFFERENCE_TO_ERROR * finer * error, "error": finer * error, "much_lost": lost}
+            for _, error, lost, _ in marked
         ]
         if taken == FIRST_LOOK:
             found = []
@@ -239,8 +243,8 @@ def wanted_samples(deviations: Floats, samples: int) -> float:
     found = deviations[deviations > 0].astype(np.float64)
     if not found.size:
         return 0.0
-    # Pixels stop at powers of two. On average this is sqrt(2) times the number that they need: hence the half.
-    return float(samples * np.sqrt(0.5 * (found ** (2 / 3)).sum() / np.square(found).sum()))
+    # Pixels stop at the next look, with more than they need; others have too few, as deviations are estimates.
+    return float(samples * ((found**0.8).sum() / np.square(found).sum()) ** (2 / 3))
 
 
 def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
@@ -263,6 +267,17 @@ def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_]) -> npt.NDArray
     far = (distance > ISOLATED * np.maximum(spread, LEAST_SPREAD * np.abs(median))) & (off > ALONE * distance)
     found[row[far], column[far]] = True
     return found
+
+
+def _looks(samples: int) -> set[int]:
+    """Numbers of samples after which settled pixels are left out.
+
+    After the first look each time that there are sqrt(2) times as many, and after all of the picture.
+    """
+    if samples <= FIRST_LOOK:
+        return {1}
+    later = {round(samples * 2 ** (i / 2)) for i in range(-2 * samples.bit_length(), 2)}
+    return {1, FIRST_LOOK} | {number for number in later if number > FIRST_LOOK}
 
 
 def _most(samples: int) -> int:
@@ -309,8 +324,8 @@ def traced_samples(job: FrameJob) -> float:
 def _central_first(samples: int) -> list[tuple[float, float]]:
     """Sub-pixel shifts of the samples, the most central first: where surroundings are smooth, it is the only one.
 
-    The next three make with it four whose mean is nearest to that of all samples where light varies as a polynomial of
-    degree 2. Those of the pixels that take more follow, whose mean is in the middle, too.
+    The next of the first look make with it those whose mean is nearest to that of all samples where light varies as a
+    polynomial of degree 2. Those of the pixels that take more follow, whose mean is in the middle, too.
     """
     shifts, more = sample_shifts(samples), sobol_points(_most(samples))[samples:]
     nearest = int(np.argmin(np.square(shifts).sum(axis=1)))
@@ -318,9 +333,9 @@ def _central_first(samples: int) -> list[tuple[float, float]]:
     if samples > FIRST_LOOK:
         x, y = shifts.T
         moments = np.stack([x, y, x * x, x * y, y * y], axis=1)
-        triples = np.array(list(combinations(order[1:_CHOICE], 3)))
-        off = (moments[nearest] + moments[triples].sum(axis=1)) / 4 - moments.mean(axis=0)
-        best = triples[int(np.argmin(np.square(off).sum(axis=1)))].tolist()
+        others = np.array(list(combinations(order[1:_CHOICE], FIRST_LOOK - 1)))
+        off = (moments[nearest] + moments[others].sum(axis=1)) / FIRST_LOOK - moments.mean(axis=0)
+        best = others[int(np.argmin(np.square(off).sum(axis=1)))].tolist()
         order = [nearest, *best, *(i for i in order[1:] if i not in best)]
     shifts = shifts[order]
     if len(more):

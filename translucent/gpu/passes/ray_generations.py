@@ -30,6 +30,9 @@ MOST_BYTES = 64 << 20
 #: alive at once, in bodies with many walls three.
 PLACES, MORE_PLACES = 6, 8
 
+#: Places at least, to each channel: the tree of one pixel has at most 1024 rays, see ``shaders/transport/ray_step.glsl``.
+LEAST_PLACES = 2 * 1024
+
 #: Rows of the lists of live rays and what they hit; bytes of these, of light, and of the lists of pixels and of ends,
 #: for each ray.
 _ROWS = 8
@@ -105,6 +108,7 @@ class RayGenerations:
         while waiting:
             portion = waiting.pop()
             if not self._trace_portion(portion, room, hits, programs):
+                assert len(portion) > 1
                 waiting += _halves(portion)[::-1]
 
     def _trace_portion(self, portion: range, room: _Room, hits: EmbreeHits, programs: _Programs) -> bool:
@@ -169,7 +173,7 @@ class _Room:
         self.end_words = 16 + bool(switches["MICROFACETS"]) + 4 * bool(switches["TEXTURED"])
         branch = 4 * (self.words + 7)
         most = MOST_BYTES // (2 * branch + (_LIVE_BYTES + 8 * self.end_words) // 2)
-        self.places = min(MORE_PLACES * self.channels * len(pixels), most)
+        self.places = min(self.channels * max(MORE_PLACES * len(pixels), LEAST_PLACES), most)
         self.live = self.places // 2
         storage = job.resources.rays
         self._rays, self._branches = (
