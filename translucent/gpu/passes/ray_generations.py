@@ -30,7 +30,8 @@ MOST_BYTES = 64 << 20
 #: alive at once, in bodies with many walls three.
 PLACES, MORE_PLACES = 6, 8
 
-#: Places at least, to each channel: the tree of one pixel has at most 1024 rays, see ``shaders/transport/ray_step.glsl``.
+#: Places at least, to each channel: the tree of one pixel has at most 1024 rays; see
+#: ``shaders/transport/ray_step.glsl``.
 LEAST_PLACES = 2 * 1024
 
 #: Rows of the lists of live rays and what they hit; bytes of these, of light, and of the lists of pixels and of ends,
