@@ -36,7 +36,7 @@ MIRROR_ERROR = 0.005
 
 #: Second difference of the light of neighbors to the standard error of one sample in the middle of a pixel. An edge
 #: across a pixel has a difference as large as its step. The sample finds the larger side: its mean error is the step
-#: times the smaller part of the pixel, from 0 to 1/2, whose mean square is 1/12. Light that varies linearly has neither.
+#: times the smaller part of the pixel, from 0 to 1/2, whose mean square is 1/12. Light that is linear has neither.
 DIFFERENCE_TO_ERROR = 12.0**0.5
 
 #: Samples after which deviations are measured, and the most samples of a pixel, in those of the picture. Fewer of the
