@@ -44,10 +44,10 @@ void main() {
     // All that takes derivatives comes first: they are undefined where a neighbor has been discarded.
     vec3 normal = mapped_normal(normalize(world_normal), from_eye, surface_uv);
     float variance = normal_variance(normal);
-    float roughness = surface_roughness * texture(roughness_texture, texture_coordinate(ROUGHNESS_TEXTURE, surface_uv)).g;
-    float transmission = surface_color.w * texture(transmission_texture, texture_coordinate(TRANSMISSION_TEXTURE, surface_uv)).r;
+    float roughness = surface_roughness * textured_roughness(surface_uv).g;
+    float transmission = surface_color.w * textured_transmission(surface_uv);
 #if !BACK
-    vec4 textured = vertex_color * texture(color_texture, texture_coordinate(COLOR_TEXTURE, surface_uv));
+    vec4 textured = vertex_color * textured_color(surface_uv);
     vec4 tint = vec4(surface_color.rgb * textured.rgb, unoccluded(surface_uv));
 #if HOLES
     if (textured.a < hole_below) { discard; }

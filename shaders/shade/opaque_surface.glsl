@@ -29,9 +29,9 @@ const float opaque_clearcoat_roughness = 0.0;
 
 // Of a fragment; takes derivatives. vertex: color and opacity of the mesh there.
 OpaqueSurface opaque_surface_at(vec3 base, vec3 normal, vec3 position, vec2 uv, vec4 vertex) {
-    vec4 textured = vertex * texture(color_texture, texture_coordinate(COLOR_TEXTURE, uv));
-    vec4 rough = texture(roughness_texture, texture_coordinate(ROUGHNESS_TEXTURE, uv));
-    vec3 emitted = opaque_emissive * texture(emissive_texture, texture_coordinate(EMISSIVE_TEXTURE, uv)).rgb;
+    vec4 textured = vertex * textured_color(uv);
+    vec4 rough = textured_roughness(uv);
+    vec3 emitted = opaque_emissive * textured_emission(uv);
     vec3 mapped = mapped_normal(normal, position, uv);
     return OpaqueSurface(base * textured.rgb, opaque_metallic * rough.b, clamp(opaque_roughness * rough.g, 0.0, 1.0), opaque_ior,
         opaque_passed, opaque_passed_share, emitted, mapped, normal_variance(mapped), textured.a, unoccluded(uv),

@@ -1,5 +1,7 @@
 // Textures of a surface, over the texture coordinates of its mesh. Derivatives are taken: ask before any discard.
+// SURFACE_TEXTURES: it has some.
 
+#if SURFACE_TEXTURES
 uniform sampler2D color_texture;
 uniform sampler2D roughness_texture;
 uniform sampler2D transmission_texture;
@@ -27,6 +29,11 @@ vec2 texture_coordinate(int number, vec2 uv) {
     return vec2(turned.x, 1.0 - turned.y);
 }
 
+vec4 textured_color(vec2 uv) { return texture(color_texture, texture_coordinate(COLOR_TEXTURE, uv)); }
+vec4 textured_roughness(vec2 uv) { return texture(roughness_texture, texture_coordinate(ROUGHNESS_TEXTURE, uv)); }
+float textured_transmission(vec2 uv) { return texture(transmission_texture, texture_coordinate(TRANSMISSION_TEXTURE, uv)).r; }
+vec3 textured_emission(vec2 uv) { return texture(emissive_texture, texture_coordinate(EMISSIVE_TEXTURE, uv)).rgb; }
+
 // Share of the light of the environment that reaches a point.
 float unoccluded(vec2 uv) {
 #if OCCLUSION
@@ -52,3 +59,11 @@ vec3 mapped_normal(vec3 normal, vec3 position, vec2 uv) {
     float scale = inversesqrt(longest) * (dot(cross(along_x, along_y), normal) < 0.0 ? -1.0 : 1.0);
     return normalize(tangent * scale * mapped.x + bitangent * scale * mapped.y + normal * max(mapped.z, 1e-3));
 }
+#else
+vec4 textured_color(vec2 uv) { return vec4(1.0); }
+vec4 textured_roughness(vec2 uv) { return vec4(1.0); }
+float textured_transmission(vec2 uv) { return 1.0; }
+vec3 textured_emission(vec2 uv) { return vec3(1.0); }
+float unoccluded(vec2 uv) { return 1.0; }
+vec3 mapped_normal(vec3 normal, vec3 position, vec2 uv) { return normal; }
+#endif

@@ -1,7 +1,7 @@
 // One step of a ray in the tree of traced interfaces: from where it starts to the surface that it hits, and the interaction there.
 // Adds the light of what ends, and leaves the ray of the stronger branch and that of the weaker one. Who includes it finds the
 // hits and follows the rays: nothing here depends on the order, nor on the pixel but by arguments. What is absorbed and emitted
-// on each segment is exact. Radiance is basic radiance, L / n^2. ROUGH: some body is.
+// on each segment is exact. Radiance is basic radiance, L / n^2. ROUGH: some body is. LIGHTS: there are some.
 
 #include "lib/color.glsl"
 #include "lib/optics.glsl"
@@ -419,7 +419,9 @@ vec3 with_lights(vec3 light, vec3 direction, PrimaryHit primary, vec3 emitted, f
         float cosine = clamp(-dot(primary.normal, direction), 0.0, 1.0);
         entering = vec3(1.0 - interface_reflectance(cosine, surface.ior, surface.roughness)) * surface.transmission * primary.color;
         entering *= 1.0 - coat_reflectance(surface.clearcoat, cosine);
+#if LIGHTS
         light += coated_highlights(primary.point, primary.normal, direction, surface, variance);
+#endif
     }
 #if !EMISSION
     light += entering * emitted;

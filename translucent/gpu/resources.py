@@ -48,9 +48,9 @@ class MeshBuffers:
         if (array := self._arrays.get(program.glo)) is None:
             if "corner_normal" in program or ("uv" in program and "normal" not in program):
                 # What only emits has no use for normals.
-                lit = "corner_normal" in program
-                layout = ("3f 3f 2f", "offset", "corner_normal", "uv") if lit else ("3f 12x 2f", "offset", "uv")
-                content = [(self._smooth_faces(mesh), *layout), *self._corner_looks(program, mesh)]
+                read = [name for name in ("offset", "corner_normal", "uv") if name in program]
+                layout = f"3f {'3f' if 'corner_normal' in read else '12x'} {'2f' if 'uv' in read else '8x'}"
+                content = [(self._smooth_faces(mesh), layout, *read), *self._corner_looks(program, mesh)]
                 array = self._gl.vertex_array(program, content)
             elif "normal" in program:
                 content = [(self._flat_faces(mesh), "3f 3f", "offset", "normal")]

@@ -13,6 +13,8 @@ import time
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, TypeAlias
 
 import moderngl
@@ -307,7 +309,7 @@ def decided_lines(
     file = 0
     live, done = [True], [True]  # for each nested condition: whether we are in, and whether a branch has been taken
     for line in gathered.lines:
-        if match := _LINE.match(line):
+        if line.startswith("#line ") and (match := _LINE.match(line)):
             file = int(match[1])
             continue
         match = DIRECTIVE.match(line) if "#" in line else None
@@ -387,6 +389,11 @@ def parts_of(lines: Iterable[tuple[int, str]]) -> Iterator[ShaderPart]:
         yield ShaderPart(last, "\n".join(above), "")
 
 
+@lru_cache(maxsize=1024)  # programs have most of their files in common
+def _parts_of_file(lines: tuple[str, ...]) -> tuple[ShaderPart, ...]:
+    return tuple(parts_of((0, line) for line in lines))
+
+
 def reached(parts: list[ShaderPart]) -> list[ShaderPart]:
     """Parts that the shader needs, and the comments on files that have such parts."""
     functions = {part.function for part in parts}
@@ -426,7 +433,8 @@ def used_code(name: str, gathered: Gathered, source: ShaderSource, defines: Mapp
     That is half of the time in which Mesa's makes a program. A shader that refuses the switches stays whole.
     """
     try:
-        parts = reached(list(parts_of(decided_lines(name, gathered, defines, set()))))
+        by_file = groupby(decided_lines(name, gathered, defines, set()), itemgetter(0))
+        parts = reached([part for _, lines in by_file for part in _parts_of_file(tuple(line for _, line in lines))])
     except InputError:
         return source.text
     head = source.text.partition("#line ")[0]

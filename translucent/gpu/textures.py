@@ -48,6 +48,11 @@ def kind_of(texture: Texture) -> int:
     return found
 
 
+def has_textures(surface: Surface | None) -> bool:
+    """True if a surface has textures: others have programs that read none."""
+    return surface is not None and any(texture is not None for texture in surface.textures)
+
+
 class TextureCache:
     """Cache of each texture that has been drawn and is still alive, with mipmaps.
 
@@ -68,7 +73,9 @@ class TextureCache:
         return texture
 
     def bind(self, surface: Surface, program: moderngl.Program, first_unit: int) -> None:
-        """Bind a surface's textures for a program that includes ``shade/surface_textures.glsl``."""
+        """Bind a surface's textures, if it has some, for a program that includes ``shade/surface_textures.glsl``."""
+        if not has_textures(surface):
+            return
         rows = []
         chosen = {
             name: getattr(surface, name) or (_STRAIGHT if name == "normal_texture" else _WHITE)

@@ -191,9 +191,8 @@ class CausticsPass:
         for i in objects[::-1]:
             body = job.scene.objects[i]
             if (surface := body.surface) is None:
-                program = self._plain.program(
-                    WITH_NORMAL=1, WITH_POSITION=1, SURFACE=0, VERTEX_COLORS=0, OCCLUSION=0, **bare
-                )
+                switches = dict.fromkeys(("SURFACE", "VERTEX_COLORS", "SURFACE_TEXTURES", "OCCLUSION"), 0)
+                program = self._plain.program(WITH_NORMAL=1, WITH_POSITION=1, **switches, **bare)
             else:
                 program = self._surfaced.program(
                     SURFACE=1, **look_switches(body), **unshadowed, **coat_switches([body])

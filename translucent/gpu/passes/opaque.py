@@ -89,6 +89,7 @@ class OpaquePass:
                     WITH_POSITION=1,
                     SURFACE=0,
                     VERTEX_COLORS=0,
+                    SURFACE_TEXTURES=0,
                     OCCLUSION=0,
                     **common,
                     **coat_switches(()),
@@ -121,7 +122,8 @@ class OpaquePass:
         for i in objects:
             surface = view.scene.objects[i].surface
             if surface is None or not surface.alpha_cutoff:
-                switches = {"WITH_NORMAL": 1, "WITH_POSITION": 1, "SURFACE": 0, "VERTEX_COLORS": 0, "OCCLUSION": 0}
+                bare = dict.fromkeys(("SURFACE", "VERTEX_COLORS", "SURFACE_TEXTURES", "OCCLUSION"), 0)
+                switches = {"WITH_NORMAL": 1, "WITH_POSITION": 1, **bare}
                 program = self._plain.program(**switches, **common)
             else:
                 program = self._surfaced.program(SURFACE=1, **common, **look_switches(view.scene.objects[i]))

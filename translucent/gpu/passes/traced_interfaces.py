@@ -220,6 +220,7 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
         "DIFFUSED": job.diffused_light is not None,
         "MICROFACETS": mirror or rough,
         "ROUGH": rough,
+        "LIGHTS": bool(scene.lights),
         "MIRROR": mirror,
         "DISPERSION": any(surface.dispersion > 0 for surface in surfaces),
         "OPAQUE": job.features.has_opaque,

@@ -11,7 +11,7 @@ from translucent.gpu.features import FrameFeatures
 from translucent.gpu.job import FrameJob
 from translucent.gpu.placement import Part
 from translucent.gpu.shaders import before_making, build_compute, build_program
-from translucent.gpu.textures import AnyTexture
+from translucent.gpu.textures import AnyTexture, has_textures
 from translucent.scene.environment import Environment
 from translucent.scene.scene import Object
 
@@ -179,7 +179,11 @@ def walk_switches(features: FrameFeatures) -> dict[str, bool | int]:
 def look_switches(body: Object) -> dict[str, bool]:
     """Switches of ``geometry/interface.vert`` and ``shade/surface_textures.glsl``: features that few objects have."""
     occluded = body.surface is not None and body.surface.occlusion_texture is not None
-    return {"VERTEX_COLORS": body.mesh.colors is not None, "OCCLUSION": occluded}
+    return {
+        "VERTEX_COLORS": body.mesh.colors is not None,
+        "SURFACE_TEXTURES": has_textures(body.surface),
+        "OCCLUSION": occluded,
+    }
 
 
 def background_switches(environment: Environment) -> dict[str, int]:
