@@ -26,8 +26,8 @@ from translucent.gpu.uniforms import media_center
 #: Bytes of the buffers of rays, however large the frame is.
 MOST_BYTES = 64 << 20
 
-#: Places for rays to each pixel of a portion. Live rays fill no more than half of them: about two rays of a pixel are
-#: alive at once, in bodies with many walls three.
+#: Places for rays to each pixel of a portion that has rays. Live rays fill no more than half of them: about two rays
+#: of a pixel are alive at once, in bodies with many walls three.
 PLACES, MORE_PLACES = 6, 8
 
 #: Places at least, to each channel: the tree of one pixel has at most 1024 rays; see
@@ -108,22 +108,24 @@ class RayGenerations:
         waiting = room.portions(len(pixels))[::-1]
         while waiting:
             portion = waiting.pop()
-            if not self._trace_portion(portion, room, hits, programs):
+            parts = self._trace_portion(portion, room, hits, programs)
+            if parts > 1:
                 assert len(portion) > 1
-                waiting += _halves(portion)[::-1]
+                waiting += _parts(portion, parts)[::-1]
 
-    def _trace_portion(self, portion: range, room: _Room, hits: EmbreeHits, programs: _Programs) -> bool:
-        """Trace the rays of some of the pixels; returns False if there is no room for them all."""
+    def _trace_portion(self, portion: range, room: _Room, hits: EmbreeHits, programs: _Programs) -> int:
+        """Trace the rays of some of the pixels; returns into how many parts to divide these, 1 if that is done."""
         begin, step, leave, shade, sum_up = programs
         set_used(begin, {"first_number": portion.start, "pixel_count": len(portion)})
         room.bind_begin()
         self._begin.run(begin, len(portion))
-        filled = len(portion) * room.channels
-        while count := len((live := room.turn(filled)).places):
+        live = room.turn(len(portion) * room.channels)
+        if (parts := -(-PLACES * len(live.places) // room.places)) > 1:
+            return parts
+        while count := len(live.places):
             if count > room.live:
-                return False
+                return 2
             found, pixels = room.put(live, hits.nearest(live.origins, live.directions))
-            filled = 2 * found
             set_used(step, {"live_count": found, "live_rows": count})
             set_used(leave, {"first_number": found, "live_count": count, "live_rows": count})
             set_used(sum_up, {"pixel_count": pixels})
@@ -136,7 +138,8 @@ class RayGenerations:
                 self._shade.run(shade, ended)
             room.bind_sums()
             self._sum.run(sum_up, pixels)
-        return True
+            live = room.turn(2 * found)
+        return 1
 
 
 class _Programs(NamedTuple):
@@ -201,8 +204,11 @@ class _Room:
         self._first_triangles = first_triangles
 
     def portions(self, count: int) -> list[range]:
-        """Numbers of so many pixels in portions, each with rays that there is room for at first."""
-        most = max(self.places // (PLACES * self.channels), 1)
+        """Numbers of so many pixels in portions, each with rays that there is room for at first.
+
+        Most pixels may have no interface, and so no ray.
+        """
+        most = max(self.places // self.channels, 1)
         return [range(begin, min(begin + most, count)) for begin in range(0, count, most)]
 
     def bind_begin(self) -> None:
@@ -315,7 +321,7 @@ def all_words(part: Part) -> Pixels:
     return pixel_words(np.ones((height, width), bool), left, top)
 
 
-def _halves(portion: range) -> list[range]:
-    """Two halves of a range of pixels."""
-    middle = (portion.start + portion.stop) // 2
-    return [range(portion.start, middle), range(middle, portion.stop)]
+def _parts(portion: range, count: int) -> list[range]:
+    """So many parts of a range of pixels, one pixel each at least."""
+    step = -(-len(portion) // count)
+    return [portion[begin : begin + step] for begin in range(0, len(portion), step)]
