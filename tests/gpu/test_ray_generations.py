@@ -116,17 +116,19 @@ def test_pictures_are_the_same_to_the_last_bit_in_any_portions(
         np.testing.assert_array_equal(again.valid, made[0].valid)
 
 
-def test_portions_are_halved_where_rays_have_no_room(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_portions_are_divided_where_rays_have_no_room(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = SCENES["dispersion"]()
-    whole, halves = rendered(renderer, scene, "embree"), []
-    made = ray_generations._halves
-    monkeypatch.setattr(ray_generations, "_halves", lambda rectangle: halves.append(rectangle) or made(rectangle))
+    whole, divided = rendered(renderer, scene, "embree"), []
+    made = ray_generations._parts
+    monkeypatch.setattr(
+        ray_generations, "_parts", lambda portion, count: divided.append(portion) or made(portion, count)
+    )
     monkeypatch.setattr(traced_interfaces, "MOST_LIGHT", 7 * SIZE[0])
     monkeypatch.setattr(ray_generations, "PLACES", 1)
     monkeypatch.setattr(ray_generations, "MORE_PLACES", 2)
     monkeypatch.setattr(ray_generations, "LEAST_PLACES", 1)
     np.testing.assert_array_equal(rendered(renderer, scene, "embree").radiance, whole.radiance)
-    assert halves
+    assert divided
 
 
 def test_one_pixel_has_room_for_all_its_rays(renderer: tl.Renderer) -> None:
