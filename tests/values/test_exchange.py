@@ -174,6 +174,20 @@ def test_an_opaque_ball_in_a_ball_takes_what_diffusion_brings_to_it(color: float
     np.testing.assert_allclose(values.mean(), on_it, rtol=0.1)
 
 
+def test_a_white_ball_in_thin_milk_is_as_bright_as_uniform_light() -> None:
+    """All light that comes to it goes on: nothing of it counts twice, however much of it is unscattered."""
+    outer = tl.Object(Sphere().tessellate(24), tl.Medium(scattering=(0.5, 1.5, 4.0), ior=1.3))
+    inner = tl.Object(Sphere(radius=0.5).tessellate(16), None, color=(1.0, 1.0, 1.0))
+    field = (
+        FieldCache().of(plan(tl.Scene([outer, inner], CAMERA, environment=WHITE), scattering=Diffusion(16))).surfaces[0]
+    )
+    assert field.inclusions is not None
+    on_it = [channel[channel > 0.0].mean() for channel in np.moveaxis(field.inclusions, -1, 0)]
+    np.testing.assert_allclose(on_it, np.pi * 1.3**2, rtol=0.02)
+    assert (0.6 * np.pi < field.leaving.mean(axis=0)).all()
+    assert (field.leaving.mean(axis=0) < np.pi).all()
+
+
 def test_objects_beside_a_body_are_not_inside() -> None:
     """A ball that touches it, a ground, and a room around it."""
     ball = tl.Object(Sphere().tessellate(24), LOSSLESS)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
+from scipy import sparse
 
 from translucent.arrays import Array, Floats, Integers
 from translucent.diffusion.densities import Densities
@@ -33,6 +34,9 @@ DEEP_EVENTS = 2
 
 #: Relative distance of two rates of decay that are equal, up to which one is moved: their difference divides.
 _ALIKE = 1e-6
+
+#: Difference of two distances to the same place, at most, in cells: rays start a little apart, in single precision.
+_SAME = 0.01
 
 #: Fraction of the light below which no first events are looked for.
 _NOTHING = 1e-3
@@ -371,6 +375,26 @@ def scattered_fractions(grid: BodyGrid, dense: Densities, ior: float, extinction
         for direction, to in zip(directions, metres, strict=True)
     ]
     return np.asarray((1.0 - np.mean(passed, axis=0))[grid.nearest].mean(axis=1))
+
+
+def seen_inclusions(grid: BodyGrid, dense: Densities, ior: float, extinction: float) -> sparse.csr_array:
+    """(s, i): fraction of uniform light entering near each sample that reaches samples of inclusions, unscattered.
+
+    The same fraction of what leaves there comes from these samples, where they are as bright as all else.
+    """
+    samples, inner = len(grid.points), grid.inclusions
+    if inner is None:
+        return sparse.csr_array((samples, 0))
+    directions, metres = grid.crossings(ior)
+    found = sparse.csr_array((samples, len(inner.points)))
+    for direction, to in zip(directions, metres, strict=True):
+        limit, seen = inner.met(grid.points, direction)
+        hit = np.flatnonzero(limit <= to + _SAME * grid.cells.step)
+        passed = optics.transmittance(extinction * dense.along(direction, to))[hit] / len(directions)
+        found = found + sparse.csr_array((passed, (hit, seen[hit])), found.shape)
+    rows, count = np.repeat(np.arange(samples), grid.nearest.shape[1]), grid.nearest.shape[1]
+    mean = sparse.csr_array((np.full(len(rows), 1.0 / count), (rows, grid.nearest.ravel())), (samples, samples))
+    return sparse.csr_array(mean @ found)
 
 
 def half_space_excess(albedo: float, ior: float, cosine: Array | None = None) -> Array | float:

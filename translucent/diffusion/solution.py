@@ -34,6 +34,7 @@ from translucent.diffusion.first_events import (
     entry_paths,
     joined_rays,
     scattered_fractions,
+    seen_inclusions,
 )
 from translucent.diffusion.grid import BodyGrid
 from translucent.diffusion.interfaces import scattered_escape
@@ -223,6 +224,9 @@ _TINY = np.finfo(np.float64).tiny
 #: Fraction of the probability to escape that is absorbed at least where what uniform light misses is looked for.
 LEAST_ABSORBED = 0.1
 
+#: Least fraction of the fluence that the medium, and no inclusion, scattered last.
+LEAST_SCATTERED = 0.05
+
 #: Least fraction of a cell's volume that absorbs.
 _LEAST_ABSORBING = 0.02
 
@@ -342,6 +346,7 @@ class BodySystem:
                 paths,
                 scattered_fractions(grid, self._dense, medium.ior, float(absorption + scattering)),
                 medium.phase_function,
+                seen=seen_inclusions(grid, self._dense, medium.ior, float(absorption + scattering)),
                 reflected=np.asarray(colors[:, channel]),
                 walls=walls,
                 corrected=corrected,
@@ -399,8 +404,9 @@ class BodySystem:
                 part,
             )
             fluence[:, channel], flux[:, channel], leaving[:, channel], cells[:, channel], taken = found
-            passing[:, channel] = (1.0 - system.scattered) * (flux[:, channel] - straight.flux)
+            passing[:, channel] = system.through * (flux[:, channel] - straight.flux)
             inclusions[:, channel] = system.at_inclusions(cells[:, channel], flux[:, channel], straight)
+            fluence[:, channel] = system.without_inclusions(fluence[:, channel], inclusions[:, channel])
             scattered[:, channel] = system.scattered
             steps += taken
         total, directed = flux.sum(axis=1), ray.entering.sum(axis=1)
@@ -461,6 +467,7 @@ class _ChannelSystem:
         scattered: Array,
         phase: PhaseFunction = ISOTROPIC,
         *,
+        seen: sparse.csr_array | None = None,
         reflected: Array | None = None,
         walls: Walls,
         corrected: bool,
@@ -502,19 +509,23 @@ class _ChannelSystem:
         def system(part: float, *, corrected: bool = True) -> _ChannelSystem:
             """Linear system of an absorbing medium around lossless inclusions."""
             a, b, white = part * extinction, (1.0 - part) * extinction, np.ones(len(self._inclusions.lost))
-            same = partial(_ChannelSystem, grid, ior, roughness, a, b, dense, paths, scattered, walls=walls)
+            same = partial(_ChannelSystem, grid, ior, roughness, a, b, dense, paths, scattered, seen=seen, walls=walls)
             return same(reflected=white, corrected=corrected)
 
-        self._absorbing, self._correction = system, np.ones(len(depth))
-        #: (s,): see `SurfaceLight`.
-        self.scattered = scattered
+        self._absorbing, self._correction, self._brighter = system, np.ones(len(depth)), np.ones(())
+        seen = sparse.csr_array((len(depth), 0)) if seen is None else seen
+        #: (s,), (s,): fractions of the light that is scattered in the body, and that passes it.
+        self.scattered, self.through = scattered, 1.0 - scattered - seen.sum(axis=1)
+        self._seen = seen
         if corrected:
             # What half-spaces absorb has not been in the body long enough to get to other parts of it.
             reflectance = half_space_reflectance(round(self._albedo, 6), ior)
-            self._correction = 1.0 + reflectance * (system(0.0, corrected=False).by_uniform_light() - 1.0)
+            factors = system(0.0, corrected=False).by_uniform_light()
+            self._correction, self._brighter = (1.0 + reflectance * (np.asarray(factor) - 1.0) for factor in factors)
 
-    def by_uniform_light(self) -> Array:
-        """(s,): factors on the fluence that make a lossless body invisible in uniform light.
+    def by_uniform_light(self) -> tuple[Array, float]:
+        """(s,): factors on the fluence, and one on what comes to inclusions, that make a lossless body invisible in
+        uniform light.
 
         Such a body is invisible, whatever its shape: all light that leaves has been scattered, except what passes
         straight through. Diffusion sends too much of it out of parts no thicker than a free path, and too little out
@@ -525,7 +536,12 @@ class _ChannelSystem:
         cells, _ = self._cells.solved(source, self._cells.even(source), ROUGH)
         found = (self._read @ cells) * self._attenuated + self._diffuse.near
         found = self._exit_fraction * self._with_walls(found, self._in_walls(self._diffuse.slab, self._all))
-        return np.asarray(np.clip(self.scattered / np.maximum(found, _TINY), LEAST_CORRECTION, MOST_CORRECTION))
+        surface = np.clip((1.0 - self.through) / np.maximum(found, _TINY), LEAST_CORRECTION, MOST_CORRECTION)
+        # Few paths reach each sample of an inclusion: all of them count together.
+        reaching = self._inclusions.reaching(self._grid, self._paths, self._diffuse.reached * even)
+        rest = self._ior**2 / self._interface.entering * self._inclusions.area * len(reaching) - float(reaching.sum())
+        solved = self._inclusions.area * float(self._inclusions.diffuse(cells, reaching).sum())
+        return np.asarray(surface), min(max(rest / max(solved, _TINY), LEAST_CORRECTION), MOST_CORRECTION)
 
     def _in_walls(self, slab: tuple[Array, Array], samples: Integers) -> Array:
         """(s,): fluence in thin walls by light at samples (k,), on the same side and across."""
@@ -603,7 +619,12 @@ class _ChannelSystem:
         """Irradiance at the samples of inclusions (i,), for what `solved` finds."""
         uniform = self._diffuse.reached * (flux - straight.flux)
         reaching = self._inclusions.reaching(self._grid, self._paths, uniform) + straight.reaching
-        return np.asarray(self._inclusions.diffuse(cells) + reaching / self._inclusions.area)
+        return np.asarray(self._brighter * self._inclusions.diffuse(cells, reaching) + reaching / self._inclusions.area)
+
+    def without_inclusions(self, fluence: Array, at_inclusions: Array) -> Array:
+        """(s,): fluence by the light that the medium scattered last, and not inclusions: rays see these themselves."""
+        sent = self._inclusions.reflected * at_inclusions * self._interface.entering / self._ior**2
+        return np.asarray(np.maximum(fluence - self._seen @ sent / self._exit_fraction, LEAST_SCATTERED * fluence))
 
     def _power(self, flux: Array) -> Array:
         """(cells,): power that uniform light with a flux (s,) adds by scattering and internal reflection."""
@@ -657,7 +678,7 @@ class _ChannelSystem:
             if returned is None:
                 return entering
             # Light that nothing scatters or absorbs on its way through falls on other parts, too; rays see it alone.
-            return entering + returned(leaving(fluence, flux) + (1.0 - self.scattered) * flux)
+            return entering + returned(leaving(fluence, flux) + self.through * flux)
 
         near, flux, steps = self._cells.even(source(entering)), entering, 0
         before, last = np.zeros_like(entering), min(TOLERANCE / part, FIRST)
@@ -695,8 +716,9 @@ class _ChannelSystem:
 class _InclusionLosses:
     """Light at opaque inclusions in one color channel: a part of it is reflected into the body, the rest is lost.
 
-    Of the light J = phi / (2 (1 + a)) that diffusion brings to a surface that reflects a part a of it diffusely, the
-    part 1 - a is the flux into it: -D dphi/dn = (1 - a) / (2 (1 + a)) phi.
+    A surface that reflects a part a diffusely, and receives J of diffuse light and R that nothing has scattered, takes
+    the flux F = (1 - a) J - a R of the diffuse light. With J = phi / 4 + F / 2 so is J = (phi / 2 - a R) / (1 + a) and
+    F = ((1 - a) phi / 2 - 2 a R) / (1 + a).
 
     Attributes
     ----------
@@ -726,9 +748,10 @@ class _InclusionLosses:
         lost = inner.area * d * layer.slope / layer.u
         return cls(inner.read, layer.scale / layer.u, lost, reflected, inner.area)
 
-    def diffuse(self, cells: Array) -> Array:
-        """(i,): irradiance by light that has diffused, for a fluence (cells,)."""
-        return np.asarray((self.read @ cells) * self.attenuated / (2.0 * (1.0 + self.reflected)))
+    def diffuse(self, cells: Array, reaching: Array) -> Array:
+        """(i,): irradiance by diffuse light, for a fluence (cells,) and a power (i,) that comes unscattered."""
+        found = 0.5 * (self.read @ cells) * self.attenuated - self.reflected * reaching / self.area
+        return np.asarray(np.maximum(found, 0.0) / (1.0 + self.reflected))
 
     def reaching(self, grid: BodyGrid, paths: EntryPaths, flux: Array) -> Array:
         """(i,): power in W that comes unscattered, for a flux (k,) of paths that reach inclusions."""
@@ -738,4 +761,5 @@ class _InclusionLosses:
 
     def sent(self, reaching: Array) -> Array:
         """(cells,): power that is reflected into the cells."""
-        return np.asarray(self.read.T @ (self.reflected * self.attenuated * reaching))
+        sent = 2.0 * self.reflected / (1.0 + self.reflected) * reaching
+        return np.asarray(self.read.T @ (self.attenuated * sent))
