@@ -19,6 +19,7 @@ from translucent.assets import mesh_path
 from translucent.formulas.color import to_hex
 from translucent.formulas.diffuse_interface import half_space_reflectance
 from translucent.page.albedos import with_albedo
+from translucent.scene.showcase import with_roughness
 
 SIZE = (160, 100)
 
@@ -106,6 +107,25 @@ def test_traced_glass_before_opaque(
     difference = np.abs(found - frame.radiance).max(axis=-1) / frame.radiance.mean()
     assert np.quantile(difference, 0.95) < BAR
     assert np.quantile(difference, 0.99) < 10 * BAR
+
+
+def test_rough_glass_on_a_stage(
+    web_page: WebPage, web_dist: Path, renderer: tl.Renderer, tmp_path: Path, tools: str
+) -> None:
+    """Each sample has microfacets of its own; the ground has a map of shadows, which follows the medium."""
+    size, samples = (48, 36), 4
+    for color in ("#b0e0c0", "#30c060"):
+        medium = tl.Medium.from_color(color, 0.01, ior=1.5)
+        scene = with_roughness(tl.showcase(ball(medium).mesh, medium, size), 0.4)
+        if color == "#b0e0c0":
+            opened(web_page, scene, tmp_path, tools, samples=samples)
+        else:
+            web_page.run("async () => (await translucent).setMaterial({ color: '#30c060', distance: 0.01 })")
+        frame = renderer.render(scene, size, samples=samples, adaptive=False, caustics=tl.Caustics(0))
+        found = radiance(web_page, size, samples)
+        difference = np.abs(found - frame.radiance).max(axis=-1) / frame.radiance.mean()
+        assert np.median(difference) < 0.5 * BAR
+        assert np.quantile(difference, 0.9) < 3 * BAR
 
 
 def test_material_of_the_panel(web_page: WebPage, web_dist: Path, tmp_path: Path, tools: str) -> None:

@@ -20,6 +20,7 @@ from translucent.geometry.normals import drawn_normals
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.layout import BLOCKS, BODY, TABLES, PackedTable, UniformBlock
 from translucent.gpu.lifting import lift
+from translucent.gpu.passes.traced_interfaces import microfacet_points
 from translucent.gpu.placement import PlacedScene, face_counts
 from translucent.gpu.recording import FrameRecorder, RecordedFrame
 from translucent.gpu.recording.context import INFO, RecordingContext
@@ -49,7 +50,7 @@ _LIGHT = ("light_map", "light_levels", "light_irradiance", "seen_map", "diffused
 _COMMENT = re.compile(r"//.*")
 
 #: Steps of `RecordedFrame`, by their names in the header.
-_PARTS = ("once", "single", "averaged")
+_PARTS = ("once", "media", "single", "averaged")
 
 
 def payload(
@@ -94,6 +95,7 @@ def payload(
         "name": name,
         "samples": samples,
         "shifts": sample_shifts(samples).tolist(),
+        "microfacet_points": [microfacet_points(i) for i in range(samples)],
         "exposure": exposure,
         "tone": tone,
         "notes": [{"kind": str(note.kind), "text": str(note)} for note in planned.notes],

@@ -82,7 +82,8 @@ class OpaquePass:
             job.resources.environments.light(environment).irradiance.use(self._plain.units["light_irradiance"])
         ground = job.resources.shadows.ground if job.features.has_shadow_maps else None
         for i in spec.objects[::-1]:
-            common["GROUND_SHADOWS"] = ground is not None and ground.number == i
+            mapped = ground is not None and ground.number == i
+            switches = {**common, "GROUND_SHADOWS": (2 if job.any_eye else 1) if mapped else 0}  # 1: from above alone
             if (surface := job.scene.objects[i].surface) is None:
                 program = self._plain.program(
                     WITH_NORMAL=1,
@@ -91,20 +92,19 @@ class OpaquePass:
                     VERTEX_COLORS=0,
                     SURFACE_TEXTURES=0,
                     OCCLUSION=0,
-                    **common,
+                    **switches,
                     **coat_switches(()),
                 )
             else:
                 if job.features.has_shadow_maps:
                     require_interfaces(job.gl.info)
                 looks = look_switches(job.scene.objects[i]) | coat_switches([job.scene.objects[i]])
-                program = self._surfaced.program(SURFACE=1, **common, **looks)
+                program = self._surfaced.program(SURFACE=1, **switches, **looks)
                 self._surfaced.bind(**job.resources.light_textures(environment))
                 set_surface(job, program, surface, surface.alpha_cutoff)
-            if common["GROUND_SHADOWS"]:
-                assert ground is not None
+            if ground is not None and mapped:
                 ground.texture.use(self._plain.units["ground_shadows"])
-                set_uniform(program, "ground_rows", ground.rows)
+                set_used(program, {"ground_rows": ground.rows, "mapped_ground": ground.plane})
             job.draw(program, (i,))
         job.gl.depth_func = "<"
 

@@ -303,7 +303,7 @@ class ShadowMapsPass:
 def _mapped_ground(job: FrameJob) -> Mirror | None:
     """Ground with a map of the environment's shadows, made once for all samples; None without such a map."""
     few = job.bending and job.plan.shadows.directions is not None
-    if few or job.any_eye or not job.scene.environment_shadows or not job.plan.has(PassName.OPAQUE):
+    if few or not job.scene.environment_shadows or not job.plan.has(PassName.OPAQUE):
         return None
     return ground_from_above(job.scene)
 
@@ -409,7 +409,7 @@ class GroundShadowsPass:
         side = _side(job, bounds, axes)
         target = self._sized(side)
         key = made_of, irradiance.tobytes(), tuple(lit), middle.tobytes(), axes.tobytes()
-        if key != self._made_of:
+        if key != self._made_of or job.any_eye:  # each recording has the map, which media change
             self._made_of = None
             job.resources.shadows.use(self._variants.units)
             program = self._variants.program(**shadow_switches(True, job.resources))
@@ -438,7 +438,7 @@ class GroundShadowsPass:
 
     def _sized(self, side: int) -> moderngl.Framebuffer:
         """Framebuffer of the map, so many texels wide."""
-        if self._target is None or self._target.width != side:
+        if self._target is None or self._target.size != (side, side):
             if self._target is not None:
                 self._target.color_attachments[0].release()
                 self._target.release()
@@ -476,7 +476,7 @@ def _frame(bounds: Array, ground: Mirror) -> tuple[Array, Array]:
 def _side(job: FrameJob, bounds: Array, axes: Array) -> int:
     """Side of the map in texels: a power of two, or the largest."""
     most = min(job.plan.shadows.size // 2, MOST_TEXELS)
-    if job.plan.shadows.directions is not None:  # of a window, whose pictures change their size
+    if job.plan.shadows.directions is not None or job.any_eye:  # of a window, whose pictures change their size
         return most
     camera, size = job.scene.camera, job.targets.size
     away = float(np.linalg.norm(np.maximum(np.maximum(bounds[0] - camera.eye, camera.eye - bounds[1]), 0.0)))

@@ -210,6 +210,7 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
     surfaces = [body.surface for body in scene.bodies if body.surface is not None]
     rough = any(max(surface.roughness, surface.clearcoat_roughness) > 0 for surface in surfaces)
     shadows = interface_shadow_switches(job)
+    diffused, has_ground = job.diffused_light is not None, job.resources.shadows.ground is not None
     return {
         "FORKS": job.plan.interfaces.tree[1] if job.plan.interfaces else 0,
         "FROM_EYE": job.placed.starts_inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
@@ -217,7 +218,7 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
         "TEXTURED": job.features.textured,
         "EMISSION": job.features.emits and not job.features.scatters,
         "LAYERED": any(treatment_of(body) is Treatment.LAYER for body in scene.bodies),
-        "DIFFUSED": job.diffused_light is not None,
+        "DIFFUSED": diffused,
         "MICROFACETS": mirror or rough,
         "ROUGH": rough,
         "LIGHTS": bool(scene.lights),
@@ -225,8 +226,9 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
         "DISPERSION": any(surface.dispersion > 0 for surface in surfaces),
         "OPAQUE": job.features.has_opaque,
         **shadows,
-        # Shadows on the ground that the picture does not show are looked up in the map of it.
-        "GROUND_SHADOWS": 2 if shadows["SHADOW_MAPS"] and job.resources.shadows.ground is not None else 0,
+        # Shadows on the ground that the picture does not show are looked up in the map of it. Browsers promise 16
+        # textures, and with light that diffuses it would be the 17th.
+        "GROUND_SHADOWS": 2 if shadows["SHADOW_MAPS"] and has_ground and not (job.any_eye and diffused) else 0,
         "DIMMED": job.features.dims_interfaces,
         "DIFFUSE_BASE": any(s.transmission < 1 or s.transmission_texture is not None for s in surfaces),
         **background_switches(environment),

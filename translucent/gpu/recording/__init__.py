@@ -9,7 +9,7 @@ import moderngl
 
 from translucent.formulas.sampling import sample_shifts
 from translucent.gpu.job import CameraView, FrameJob
-from translucent.gpu.layout import BODY_STRIDE
+from translucent.gpu.layout import BODY_STRIDE, SHADOWS
 from translucent.gpu.passes import PASSES, Pass
 from translucent.gpu.placement import Part
 from translucent.gpu.recording.context import RecordedBuffer, RecordedMeshes, RecordingContext
@@ -45,6 +45,8 @@ class RecordedFrame:
     ----------
     once : list of dict
         Steps that no camera changes: maps of shadows.
+    media : list of dict
+        Steps that only media change: the map of the environment's shadows on the ground.
     single : list of dict
         Steps of a frame with one sample in the middle of each pixel.
     averaged : list of dict
@@ -60,6 +62,7 @@ class RecordedFrame:
 
     plan: RenderPlan
     once: list[dict[str, Any]] = field(default_factory=list)
+    media: list[dict[str, Any]] = field(default_factory=list)
     single: list[dict[str, Any]] = field(default_factory=list)
     averaged: list[dict[str, Any]] = field(default_factory=list)
     blocks: dict[int, bytes] = field(default_factory=dict)
@@ -101,6 +104,8 @@ class FrameRecorder:
         frame = RecordedFrame(plan)
         self.gl.live_blocks = {}
         self._run(job, frame.once, frame.single)
+        frame.media = _map_of_ground(frame.once)
+        frame.once = [step for step in frame.once if step not in frame.media]
         frame.blocks = dict(self.gl.live_blocks)
         bodies = cast(RecordedBuffer, job.uniforms.bodies)
         frame.bodies = [
@@ -144,3 +149,12 @@ class FrameRecorder:
             for step in self.gl.steps[before:]:
                 step["pass"] = spec.name.value
         self.gl.live = True
+
+
+def _map_of_ground(steps: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Steps that make the map of shadows on the ground; they read the media as they are when the steps run."""
+    targets = {step["target"] for step in steps if "ground_texels" in step.get("uniforms", {})}
+    found = [step for step in steps if step.get("target") in targets]
+    for step in found:
+        step.get("blocks", {}).pop(SHADOWS.name, None)
+    return found

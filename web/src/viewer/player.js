@@ -60,7 +60,7 @@ export class Player {
   #blendedTargets() {
     const found = new Set();
     for (const variant of Object.values(this.page.variants)) {
-      for (const steps of [variant.once, variant.single, variant.averaged]) {
+      for (const steps of [variant.once, variant.media, variant.single, variant.averaged]) {
         for (const step of steps) {
           if (step.op === "draw" && step.flags & BLEND) {
             this.page.framebuffers[step.target].colors.forEach((texture) => found.add(texture));
@@ -115,9 +115,14 @@ export class Player {
       this.shadows = shadows;
     }
     this.#upload(live);
+    const ground = `${shadows} ${material.tableKey}`;
+    if (variant.media.length && this.ground !== ground) {
+      this.#play(variant.media, key, size, material, {});
+      this.ground = ground;
+    }
     this.#relight(material.albedo);
     if (several && view.sample === 0) this.clear(variant.targets.average_target, size);
-    const uniforms = several ? { sample_number: view.sample } : {};
+    const uniforms = several ? { microfacet_points: page.microfacet_points[view.sample] } : {};
     this.#play(several ? variant.averaged : variant.single, key, size, material, uniforms);
     return where;
   }
@@ -290,8 +295,8 @@ export class Player {
 
   /** Begin to compile all programs of a variant; drivers do so side by side. */
   warm(key) {
-    const { once, single, averaged } = this.page.variants[key];
-    for (const step of [...once, ...single, ...averaged]) if (step.op === "draw") begin(this.gl, this.page.programs[step.program]);
+    const { once, media, single, averaged } = this.page.variants[key];
+    for (const step of [...once, ...media, ...single, ...averaged]) if (step.op === "draw") begin(this.gl, this.page.programs[step.program]);
   }
 
   #bindingOf(number) {
