@@ -103,15 +103,13 @@ def test_a_ball_in_uniform_light() -> None:
 
 
 def test_a_dense_ball_in_uniform_light() -> None:
-    """Cells as large as three mean free paths, in which the equation is solved as in a flat layer.
+    """Cells as large as three mean free paths: in each the equation is solved as in a layer as curved as the surface.
 
-    Measured: -6.4 %, -4.2 %, -2.4 % at three resolutions, and -4 % at all of them where light goes no further than 1/29
-    of the radius: the layer lacks the curvature, 1 / (k R), until cells are smaller than that.
+    Measured: -0.8 %, -0.2 %, 0.3 % at three resolutions; a flat layer has -6.4 %, -4.2 %, -2.4 %.
     """
     errors = np.array([ball_errors(resolution, 30.0) for resolution in (10, 20, 40)])
     assert np.abs(errors[:, 0]).max() < 1e-3
-    assert (np.diff(np.abs(errors[:, 1])) < 0).all()
-    assert np.abs(errors[:, 1]).max() < 0.07
+    assert (np.abs(errors[:, 1]) < (0.015, 0.01, 0.005)).all()
     attenuation = math.sqrt(9.0 / float(diffusion_coefficient(9.0, 30.0)))
     assert np.abs(errors[:, 2]).max() < 1.5 / attenuation
 

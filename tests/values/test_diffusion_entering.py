@@ -96,8 +96,8 @@ def test_light_of_a_sun_goes_on_as_it_falls(rng: np.random.Generator) -> None:
         rest = np.bincount(zone, flux) / np.bincount(zone) - exact
         off.append(math.sqrt(float((rest**2).mean())) / exact.mean())
     print(off)
-    # Photons err by 1 %. Diffusion errs most in the twilight, where the light that comes in at a slant leaves soon.
-    assert off[0] < 0.13 < 0.2 < off[1]
+    # Photons err by 1 %. Without the shift of first events along the surface the first is .11: twilight is too dark.
+    assert off[0] < 0.07 < 0.2 < off[1]
 
 
 def given_back_by_a_ball(radius: float, albedos: Array, ior: float, photons: int, rng: np.random.Generator) -> Array:
@@ -150,7 +150,7 @@ def fluence_at(field: DiffusionField) -> Array:
 
 
 def test_bright_parts_of_the_environment_enter_as_lamps_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A disc of 17 degrees overhead, as the sun there; as uniform light it goes less deep. Measured: .015, .22."""
+    """A disc of 17 degrees overhead, as the sun there; as uniform light it goes less deep. Measured: .003, .05, .30."""
     texels = np.zeros((64, 128, 3), np.float32)
     texels[:3] = 1.0
     medium = tl.Medium(absorption=0.15, scattering=2.85, ior=1.3)
@@ -174,7 +174,8 @@ def test_bright_parts_of_the_environment_enter_as_lamps_do(monkeypatch: pytest.M
     monkeypatch.setattr(field, "sky_light", as_uniform)
     uniform = zones(tl.Environment.image(texels))
     off = [float(np.abs(found - sun).max()) for found in (directed, parts, uniform)]
-    assert max(off[:2]) < 0.05 < 0.1 < off[2], off
+    # Rays of environments are not shifted along the surface.
+    assert max(off[:2]) < 0.07 < 0.1 < off[2], off
 
 
 def test_constant_environments_have_no_rays_and_others_keep_their_flux() -> None:

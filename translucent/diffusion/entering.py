@@ -485,7 +485,7 @@ def from_light(
     if dimming:
         flux = flux * light_passed(dimming, start, towards, distance[lit])
     refracted = pose.inwards(refracted_direction(-towards, normals, np.full(len(lit), ior)))
-    return EnteringRays(lit, refracted, (1.0 - reflected) * relative * flux, reflected * flux)
+    return EnteringRays(lit, refracted, (1.0 - reflected) * relative * flux, reflected * flux, from_one=True)
 
 
 def _spread(towards: Array, face_normals: Array, area: float) -> tuple[Array, Array]:

@@ -14,6 +14,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy import sparse
+from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers
 from translucent.diffusion.densities import Densities
@@ -51,6 +52,13 @@ FLAT = 4.0
 #: Reduced albedo below which the reflectance of half-spaces is in proportion to it.
 _LEAST_ALBEDO = 1e-6
 
+#: Most distances between samples by which first events are shifted along the surface; parts of the events of each ray,
+#: with a length of path each; samples that shifted light is interpolated from.
+MOST_SHIFTED, SHIFTED_PARTS, INTERPOLATED = 3, 4, 3
+
+#: Bounds of the factor by which rays of one light cover more of the surface than where they enter.
+LEAST_SPREAD, MOST_SPREAD = 0.5, 2.0
+
 #: Cosines of light inside with the normal between which what half-spaces reflect of it is interpolated.
 _COSINES = np.linspace(0.0, 1.0, 513)
 
@@ -67,19 +75,23 @@ class EnteringRays:
         Inside, unit vectors.
     entering, mirrored : (k, 3) float64
         Flux that enters, and flux that the surface reflects, in W/m^2.
+    from_one : bool
+        True if all come from one light, with one ray at a sample: neighboring rays have about the same direction.
     """
 
     samples: Integers
     directions: Array
     entering: Array
     mirrored: Array
+    from_one: bool = False
 
 
 def joined_rays(rays: Sequence[EnteringRays]) -> EnteringRays:
     """All rays of several lights."""
     nothing = EnteringRays(np.zeros(0, np.int64), *np.zeros((3, 0, 3)))
     parts = zip(*((ray.samples, ray.directions, ray.entering, ray.mirrored) for ray in (nothing, *rays)), strict=True)
-    return EnteringRays(*map(np.concatenate, parts))
+    samples, directions, entering, mirrored = map(np.concatenate, parts)
+    return EnteringRays(samples, directions, entering, mirrored)
 
 
 #: Fraction of the fluence below a surface that the spread of what is read leaves at least.
@@ -102,52 +114,98 @@ class LayerSolution:
         k in 1/m.
     condition : float, or (s,) float64
         Of the surface: u' / u there.
+    curvature : float, or (s,) float64
+        Mean curvature H of the surface in 1/m. Below a rounded surface there is less and less area, exp(-2 H z) at a
+        depth z: with u = exp(H z) v the equation is v'' = (k^2 + H^2) v, and v' / v is less by H at the surface.
     spread : (s,) float64
         Integral of the density over the distance of `BodyGrid.spread`: what is read is the fluence at the depth of
         reading, and so much times its derivative.
     scale, even, rise, slope, u : (s,) float64
-        At the depth of reading: exp(-k d), and times it cosh(k d), sinh(k d) / k, u' and what is read of u.
+        At the depth of reading: exp(-k d), and times it cosh(k d), sinh(k d) / k, v' and what is read of v.
+    over : (s,) float64
+        Logarithm of what is read of u over that of v.
     """
 
     depth: Array
-    attenuation: float
+    attenuation: Array | float
     condition: Array | float
+    curvature: Array | float
     spread: Array
     scale: Array
     even: Array
     rise: Array
     u: Array
     slope: Array
+    over: Array
 
     @classmethod
-    def of(cls, depth: Array, attenuation: float, condition: Array | float, spread: Array) -> LayerSolution:
+    def of(
+        cls,
+        depth: Array,
+        attenuation: float,
+        condition: Array | float,
+        spread: Array,
+        curvature: Array | float = 0.0,
+    ) -> LayerSolution:
         """Solutions down to depths (s,)."""
-        scale = optics.transmittance(attenuation * depth)
-        even, rise = 0.5 * (1.0 + scale * scale), depth * optics.mean_transmittance(2.0 * attenuation * depth)
-        slope = attenuation**2 * rise + condition * even
+        condition, k = condition - curvature, np.hypot(attenuation, curvature)
+        scale = optics.transmittance(k * depth)
+        even, rise = 0.5 * (1.0 + scale * scale), depth * optics.mean_transmittance(2.0 * k * depth)
+        slope = k**2 * rise + condition * even
+        # u + spread u' is so much times exp(H d) (v + spread v').
+        further = np.maximum(1.0 + curvature * spread, LEAST_LEFT)
+        spread, over = spread / further, depth * curvature + np.log(further)
         # The spread is a correction of first order: it takes no more of u away than half.
         u = even + condition * rise
         too_far = spread * slope < -(1.0 - LEAST_LEFT) * u
         spread = np.where(too_far, -(1.0 - LEAST_LEFT) * u / np.where(too_far, slope, 1.0), spread)
-        u = u + spread * slope
-        return cls(depth, attenuation, condition, spread, scale, even, rise, u, slope)
+        return cls(depth, k, condition, curvature, spread, scale, even, rise, u + spread * slope, slope, over)
+
+    @property
+    def at_surface(self) -> Array:
+        """(s,): fluence at the surface over that at the depth of reading."""
+        return np.asarray(self.scale / self.u * np.exp(-self.over))
+
+    @property
+    def conductance(self) -> Array:
+        """(s,): flux through the depth of reading, for each area of the surface, over D times the fluence there."""
+        slope = self.slope + self.curvature * (self.even + self.condition * self.rise)
+        return np.asarray(slope / self.u * np.exp(-self.curvature * self.depth - self.over))
+
+    @property
+    def lateral_variance(self) -> Array:
+        """(s,): variance along one axis of the surface of where light of events right below it leaves.
+
+        On a plane a source that varies along the surface with a wave number q has k^2 + q^2 in place of k^2. So the
+        variance is -2 d log(phi) / dk^2, and phi = T / (1 + c T) with T = tanh(k d) / k.
+        """
+        depth = np.maximum(self.depth, np.finfo(np.float32).tiny)
+        k = np.maximum(self.attenuation, 1e-3 / depth)
+        t = np.tanh(k * depth) / k
+        change = (t - depth / np.cosh(np.minimum(k * depth, 300.0)) ** 2) / (k * k)
+        return np.asarray(np.maximum(change / (t * (1.0 + self.condition * t)), 0.0))
 
     def events(self, samples: Integers, rate: Array) -> tuple[Array, Array]:
         """Effects of first events above the depth of reading, where light decays with the depth at a rate (k,) in 1/m.
 
-        Integrals over the depth z of rate exp(-rate z) times sinh(k (d - z)) / k: fluence at the surface times D; and
-        times u(z): power for the cells. Both are over u at the depth of reading.
+        Integrals over the depth z of rate exp(-rate z) times exp(H z) sinh(k (d - z)) / k: fluence at the surface times
+        D; and times u(z): power for the cells. The first is over v at the depth of reading, the second over u there.
         """
-        k, scale, u = self.attenuation, self.scale[samples], self.u[samples]
+        whole, scale, u, even = rate, self.scale[samples], self.u[samples], self.even[samples]
+        k, condition, curvature = (
+            np.broadcast_to(values, self.depth.shape)[samples]
+            for values in (self.attenuation, self.condition, self.curvature)
+        )
+        rate = rate - curvature
         rate = np.where(np.abs(rate - k) < _ALIKE * rate, rate * (1.0 + _ALIKE), rate)
         passed = optics.transmittance(rate * self.depth[samples])
-        factor = rate / ((rate - k) * (rate + k) * u)
-        even, rise = self.even[samples], self.rise[samples]
+        factor = whole / ((rate - k) * (rate + k) * u)
+        rise = self.rise[samples]
         at_surface = scale * passed - even + rate * rise
         at_surface += self.spread[samples] * (rate * (even - scale * passed) - k * k * rise)
-        u_below = even + self.condition * rise
-        for_cells = scale * (rate + self.condition) - passed * (rate * u_below + self.slope[samples])
-        return factor * at_surface, factor * for_cells
+        u_below = even + condition * rise
+        for_cells = scale * (rate + condition) - passed * (rate * u_below + self.slope[samples])
+        return factor * at_surface, factor * for_cells * np.exp(-self.over[samples])
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,6 +290,98 @@ def entry_paths(ray: EnteringRays, grid: BodyGrid, dense: Densities) -> EntryPat
 
 
 @dataclass(frozen=True, eq=False)
+class LateralShift:
+    """Shift of the first events of one light along the surface, from where its rays enter to where they are scattered.
+
+    A layer in one dimension scatters light below the place where it enters. Light at a slant has gone on along the
+    surface by about a free path, out of a brighter part into a darker one: where light grazes a rounded body none of it
+    enters, and all that is scattered there comes from beside.
+
+    Attributes
+    ----------
+    rays : slice
+        Of `joined_rays`.
+    step : (s, s) csr_array
+        From a flux at the samples to that after one distance between samples along the rays.
+    level : (k,) float64
+        Distances between samples along the surface for each metre of path.
+    chord : (k,) float64
+        Metres after which rays leave the body without an interface; else inf.
+    """
+
+    rays: slice
+    step: sparse.csr_array
+    level: Array
+    chord: Array
+
+    @classmethod
+    def of(cls, grid: BodyGrid, ray: EnteringRays, rays: slice, ior: float) -> LateralShift:
+        """Shift of the rays of one light."""
+        spacing = np.sqrt(grid.area)
+        along = _across(ray.directions, grid.face_normals[ray.samples])
+        level = np.linalg.norm(along, axis=1)
+        matched = ior == 1.0
+        chord = grid.chords(ray.samples, ray.directions) if matched else np.full(len(level), np.inf)
+        return cls(rays, _step(grid, ray.samples, along), level / spacing, chord)
+
+    def shares(self, lengths: Array, weights: Array) -> Array:
+        """(`MOST_SHIFTED` + 1, k): fractions shifted by each number of steps, of path lengths (q, k) in m."""
+        place = np.minimum(lengths * self.level, MOST_SHIFTED)
+        low = np.minimum(place.astype(np.int64), MOST_SHIFTED - 1)
+        found, ray = np.zeros((MOST_SHIFTED + 1, len(self.level))), np.arange(len(self.level))
+        for one, fraction, weight in zip(low, place - low, weights, strict=True):
+            found[one, ray] += weight * (1.0 - fraction)
+            found[one + 1, ray] += weight * fraction
+        return found
+
+    def moved(self, values: Array, samples: Integers) -> Array:
+        """(s, n): values (`MOST_SHIFTED` + 1, k, n) of rays at samples (k,), shifted by each number of steps."""
+        total = np.zeros((self.step.shape[0], values.shape[2]))
+        for own in values[::-1]:
+            total = self.step @ total
+            total[samples] += own
+        return total
+
+
+def lateral_shifts(grid: BodyGrid, rays: Sequence[EnteringRays], ior: float) -> list[LateralShift]:
+    """Shifts of rays in the order of `joined_rays`, for those of one light each."""
+    ends = np.cumsum([0, *(len(ray.samples) for ray in rays)]).tolist()
+    parts = zip(rays, map(slice, ends[:-1], ends[1:]), strict=True)
+    return [LateralShift.of(grid, ray, part, ior) for ray, part in parts if ray.from_one and len(ray.samples)]
+
+
+def _across(directions: Array, normals: Array) -> Array:
+    """(k, 3): parts of directions (k, 3) along the surface with normals (k, 3)."""
+    return np.asarray(directions - (directions * normals).sum(axis=1, keepdims=True) * normals)
+
+
+def _step(grid: BodyGrid, samples: Integers, along: Array) -> sparse.csr_array:
+    """(s, s): flux at all samples from that one distance between samples before, of rays at samples (k,).
+
+    They go along the surface (k, 3), and beyond it as the nearest of them. Each sample looks back for what comes to it;
+    rays that spread along the surface bring less.
+    """
+    count, spacing = len(grid.points), float(np.sqrt(grid.area))
+    reach = (MOST_SHIFTED + 1) * spacing
+    far, nearest = cKDTree(grid.points[samples]).query(grid.points, distance_upper_bound=reach)
+    receivers = np.flatnonzero(np.isfinite(far))
+    normals, travel = grid.face_normals[receivers], np.zeros((count, 3))
+    towards = _across(along[nearest[receivers]], normals)
+    towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    travel[receivers] = towards
+    around = min(INTERPOLATED, count)
+    apart, found = grid.tree.query(grid.points[receivers] - spacing * towards, around)
+    apart, found = apart.reshape(-1, around), found.reshape(-1, around)
+    facing = (grid.face_normals[found] * normals[:, None]).sum(axis=2) > 0.0
+    weight = facing / (apart**2 + (0.1 * spacing) ** 2)
+    spread = np.clip(1.0 + spacing * grid.divergence(travel)[receivers], LEAST_SPREAD, MOST_SPREAD)
+    weight /= np.maximum(weight.sum(axis=1) * spread, np.finfo(np.float64).tiny)[:, None]
+    starts = np.zeros(count + 1, np.int64)
+    starts[receivers + 1] = around
+    return sparse.csr_array((weight.ravel(), found.ravel(), np.cumsum(starts)), (count, count))
+
+
+@dataclass(frozen=True, eq=False)
 class Events:
     """Source terms by first scattering events, for a unit of flux that enters at each of some samples.
 
@@ -264,14 +414,41 @@ class Events:
         below = [(cell, factor * weight) for cell, weight in self.below]
         return replace(self, near=factor * self.near, above=factor * self.above, below=below)
 
-    def power(self, grid: BodyGrid, samples: Integers, flux: Array) -> Array:
-        """(cells,): scattered power in each cell for a flux (k,) that enters at samples (k,), in W."""
+    def power(self, grid: BodyGrid, samples: Integers, flux: Array, above: Array | None = None) -> Array:
+        """(cells,): scattered power in each cell for a flux (k,) that enters at samples (k,), in W.
+
+        `above` (s,) is what the cells receive from above the depth of reading; default: where it enters.
+        """
         flux = grid.areas[samples] * flux
-        above = np.bincount(samples, self.above * flux, len(grid.points))
+        if above is None:
+            above = np.asarray(np.bincount(samples, self.above * flux, len(grid.points)), np.float64)
         total = np.asarray(grid.below[0].T @ above)
         for cell, weight in self.below:
             total += np.bincount(cell, weight * flux, grid.count)
         return total
+
+
+@dataclass(frozen=True, eq=False)
+class ShiftedEvents:
+    """First events of entering rays at the samples of a surface, where they are scattered.
+
+    Attributes
+    ----------
+    flux : (s,) float64
+        That enters.
+    inverse, travel : (s,), (s, 3) float64
+        Sums of this flux over 1/2 and its cosine, and of it times its direction.
+    near : (s,) float64
+        Fluence at the surface; see `Events`.
+    above : (s,) float64
+        Scattered power for the cells.
+    """
+
+    flux: Array
+    inverse: Array
+    travel: Array
+    near: Array
+    above: Array
 
 
 class FirstEvents:
@@ -350,6 +527,51 @@ class FirstEvents:
         # As if the density was even up to there.
         reached = optics.transmittance(np.where(np.isfinite(paths.limit), extinction * paths.limit, np.inf))
         return Events(self._albedo * near / self._d - excess, self._albedo * above, deep, reached, counted, slab)
+
+    def shifted(
+        self, paths: EntryPaths, events: Events, entering: Array, shifts: Sequence[LateralShift]
+    ) -> ShiftedEvents:
+        """First events of rays that enter with a flux (k,), shifted along the surface."""
+        grid, layer, samples = self._grid, self._layer, paths.samples
+        cosine = np.broadcast_to(np.asarray(paths.cosine), samples.shape)
+        # Where the medium is denser events are nearer.
+        metres = np.where(layer.depth > 0.0, grid.below[1] / np.where(layer.depth > 0.0, layer.depth, 1.0), 0.0)
+        columns = [np.ones(len(samples)), 1.0 / (0.5 + cosine), *paths.directions.T, events.near, events.above]
+        values = entering[:, None] * np.stack(columns, axis=1)
+        unshifted, total = np.ones(len(samples), bool), np.zeros((len(grid.points), len(columns)))
+        for shift in shifts:
+            unshifted[shift.rays] = False
+            own = samples[shift.rays]
+            parts = self._shares(shift, own, cosine[shift.rays], metres[own])
+            shares = np.stack([parts[0]] * 5 + [*parts[1:]], axis=2)
+            total += shift.moved(shares * values[shift.rays], own)
+        if unshifted.any():
+            own = samples[unshifted]
+            total += np.stack([np.bincount(own, part, len(total)) for part in values[unshifted].T], axis=1)
+        near = grid.smoothed(total[:, 5], float(np.mean(layer.lateral_variance * metres**2)))
+        return ShiftedEvents(total[:, 0], total[:, 1], total[:, 2:5], near, grid.areas * total[:, 6])
+
+    def _shares(
+        self, shift: LateralShift, samples: Integers, cosine: Array, metres: Array
+    ) -> tuple[Array, Array, Array]:
+        """`LateralShift.shares` of all events of rays, of their light at the surface, and of what cells receive."""
+        depth, extinction = self._layer.depth[samples], self._extinction
+        k = np.broadcast_to(self._layer.attenuation, self._layer.depth.shape)[samples]
+        chord = shift.chord / np.where(metres > 0.0, metres, 1.0)
+        parts = (np.arange(SHIFTED_PARTS)[:, None] + 0.5) / SHIFTED_PARTS
+        even = np.full((SHIFTED_PARTS, len(samples)), 1.0 / SHIFTED_PARTS)
+        every, layered = (optics.opacity(extinction * np.minimum(chord, limit)) for limit in (np.inf, depth / cosine))
+        inside = layered / np.maximum(optics.opacity(extinction * depth / cosine), np.finfo(np.float64).tiny)
+        lengths, shallow = (-np.log1p(-parts * part) / extinction for part in (every, layered))
+        # Near the depth of reading events say little of the fluence at the surface.
+        rest = np.maximum(depth - cosine * shallow, 1e-6 * depth)
+        near = rest * optics.mean_transmittance(2.0 * k * rest) * np.exp(k * (rest - depth))
+        near /= np.maximum(near.sum(axis=0), np.finfo(np.float64).tiny)
+        return (
+            shift.shares(lengths * metres, every * even),
+            shift.shares(shallow * metres, inside * near),
+            shift.shares(shallow * metres, inside * even),
+        )
 
 
 @lru_cache(maxsize=16)

@@ -61,6 +61,16 @@ INWARD_DIRECTIONS, START = 8, 1e-4
 #: Blocks of cells along the longest side of a grid. The solver corrects the mean error of each.
 BLOCKS = 8
 
+#: Cosine between normals of neighbors, at least, that lie on one rounded surface; and the part of the area around each
+#: by which neighbors must be spread for a slope to count.
+SMOOTH, STIFF = 0.5, 1e-2
+
+#: Largest change of a surface's area over the depth of reading, as half of its logarithm: mean curvature times depth.
+MOST_CURVED = 0.25
+
+#: Most steps in which values are smoothed along the surface.
+SMOOTHINGS = 8
+
 #: Places in each layer between the surface and the depth of reading at which its volume is counted.
 LAYER_PLACES = (np.arange(4) + 0.5) / 4
 
@@ -169,7 +179,12 @@ class BodyGrid:
     def nearest(self) -> Integers:
         """(s, `TOGETHER`): each sample and its nearest neighbors."""
         count = len(self.points)
-        return np.reshape(cKDTree(self.points).query(self.points, min(TOGETHER, count))[1], (count, -1))
+        return np.reshape(self.tree.query(self.points, min(TOGETHER, count))[1], (count, -1))
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """For looking up the samples nearest to a place."""
+        return cKDTree(self.points)
 
     def crossings(self, ior: float) -> tuple[Array, Array]:
         """(w, s, 3), (w, s): `inward_directions` of each sample, and metres to where they leave the body."""
@@ -272,6 +287,55 @@ class BodyGrid:
         below = (aside * normal[thin]).sum(axis=1)[:, None] - heights[across]
         found[thin] -= self.parallel * later(across, below, thin, heights[thin])
         return np.asarray(found * self.cells.step)
+
+    @cached_property
+    def _alike(self) -> tuple[Array, Array]:
+        """(s, n), (s, n, 3): whether samples of `nearest` count, 0 or 1, and metres to them."""
+        alike = (self.normals[self.nearest] * self.normals[:, None]).sum(axis=2) > SMOOTH
+        return alike.astype(np.float64), alike[..., None] * (self.points[self.nearest] - self.points[:, None])
+
+    @cached_property
+    def _divergence(self) -> Array:
+        """(s, n, 3): factors by which differences of a vector field to the samples of `nearest` give its divergence."""
+        normal, (_, offset) = self.normals, self._alike
+        along = normal[:, :, None] * normal[:, None, :]
+        spread = np.einsum("sni,snj->sij", offset, offset) + self.area * (along + STIFF * np.eye(3))
+        return np.asarray(offset @ np.linalg.inv(spread) @ (np.eye(3) - along))
+
+    def divergence(self, vectors: Array) -> Array:
+        """(s,): divergence along the surface of vectors (s, 3) at the samples, by least squares over neighbors."""
+        return np.asarray(np.einsum("snc,snc->s", self._divergence, vectors[self.nearest] - vectors[:, None]))
+
+    @cached_property
+    def curvature(self) -> Array:
+        """(s,): mean curvature of the surface in 1/m, as far as `MOST_CURVED` says; positive where it is rounded."""
+        found, most = 0.5 * self.divergence(self.normals), MOST_CURVED / self.below[1]
+        return np.asarray(np.clip(found[self.nearest].mean(axis=1), -most, most))
+
+    @cached_property
+    def _mean_of_neighbors(self) -> tuple[sparse.csr_array, float]:
+        """Mean (s, s) over `nearest` samples, and its variance along one axis of the surface in m^2."""
+        near, (alike, offset) = self.nearest, self._alike
+        weight = alike * self.areas[near]
+        weight /= weight.sum(axis=1, keepdims=True)
+        variance = 0.5 * float((weight * (offset**2).sum(axis=2)).sum(axis=1).mean())
+        starts = np.arange(len(near) + 1) * near.shape[1]
+        return sparse.csr_array((weight.ravel(), near.ravel(), starts), (len(near), len(near))), variance
+
+    def smoothed(self, values: Array, variance: float) -> Array:
+        """(s,): values (s,) at the samples, smoothed along the surface with a variance in m^2 along each axis."""
+        mean, each = self._mean_of_neighbors
+        times = min(int(np.ceil(variance / each)), SMOOTHINGS)
+        for _ in range(times):
+            values = values + min(variance / (each * times), 1.0) * (mean @ values - values)
+        return values
+
+    def chords(self, samples: Integers, directions: Array) -> Array:
+        """(k,): metres from samples (k,) in directions (k, 3) inside to where the body ends."""
+        start, into = self.points - START * self.cells.step * self.face_normals, np.linalg.inv(self.body.matrix)
+        local, number = directions @ into[:3, :3].T, np.arange(len(samples))
+        found = ray_caster_of(self.body.mesh).distances(start @ into[:3, :3].T + into[:3, 3], local, samples, number)
+        return np.where(np.isfinite(found), found, 0.0).astype(np.float64)
 
     @cached_property
     def thickness(self) -> Array:
@@ -422,14 +486,16 @@ class BodyGrid:
     @cached_property
     def layers(self) -> Array:
         """(cells,): volume in m^3 of each cell that is less deep than the fluence is read, counted for each sample."""
-        surfaces = [(self.points, self.face_normals, self.below[1], self.areas)]
+        surfaces = [(self.points, self.face_normals, self.below[1], self.areas, self.curvature)]
         if (inner := self.inclusions) is not None:
-            surfaces.append((inner.points, -inner.normals, inner.depth, np.full(len(inner.points), inner.area)))
+            areas = np.full(len(inner.points), inner.area)
+            surfaces.append((inner.points, -inner.normals, inner.depth, areas, np.zeros(len(areas))))
         volume = np.zeros(self.count)
-        for points, normals, depth, areas in surfaces:
+        for points, normals, depth, areas, curvature in surfaces:
             for place in LAYER_PLACES:
                 probe = self.probe(points - (place * depth)[:, None] * normals)
-                part = probe.weights * (areas * depth / len(LAYER_PLACES))[:, None]
+                there = areas * np.exp(-2.0 * curvature * place * depth)
+                part = probe.weights * (there * depth / len(LAYER_PLACES))[:, None]
                 volume += np.bincount(probe.cells.ravel(), part.ravel(), self.count)
         return volume
 
@@ -446,7 +512,9 @@ class BodyGrid:
     def cores(self) -> Array:
         """(cells,): volume in m^3 of each cell without its layers; with these, all are the volume of the body."""
         rest = np.maximum(self.volumes - self.layers, 0.0)
-        target = self.volumes.sum() - self.areas @ self.below[1]
+        depth = self.below[1]
+        below = np.mean([np.exp(-2.0 * self.curvature * place * depth) for place in LAYER_PLACES], axis=0)
+        target = self.volumes.sum() - self.areas @ (depth * below)
         if self.inclusions is not None:
             target -= self.inclusions.area * self.inclusions.depth.sum()
         return np.asarray(rest * min(max(target, 0.0) / max(rest.sum(), np.finfo(np.float64).tiny), 1.0))

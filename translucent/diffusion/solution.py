@@ -29,10 +29,13 @@ from translucent.diffusion.first_events import (
     EnteringRays,
     EntryPaths,
     FirstEvents,
+    LateralShift,
     LayerSolution,
+    ShiftedEvents,
     diffuse_paths,
     entry_paths,
     joined_rays,
+    lateral_shifts,
     scattered_fractions,
     seen_inclusions,
 )
@@ -328,7 +331,7 @@ class BodySystem:
         corrected: bool = True,
         warm_starts: bool = False,
     ) -> None:
-        self._warm_starts = warm_starts
+        self._warm_starts, self._ior = warm_starts, medium.ior
         self._emitted = 4.0 * np.pi * np.asarray(medium.emission)
         reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
         self._grid, self._dense = grid, dense or even_densities(grid)
@@ -390,10 +393,14 @@ class BodySystem:
         count = 0 if self._grid.inclusions is None else len(self._grid.inclusions.points)
         inclusions = np.zeros((count, 3))
         steps, ray = 0, joined_rays(rays)
-        path = entry_paths(ray, self._grid, self._dense)
+        path, normals = entry_paths(ray, self._grid, self._dense), self._grid.face_normals
+        shifts = lateral_shifts(self._grid, rays, self._ior)
+        directed, inverse, along = np.zeros(len(flux)), np.zeros(len(flux)), np.zeros_like(flux)
         for channel, system in self._channels.items():
             emission = float(self._emitted[channel])
-            straight = system.directional(ray.entering[:, channel], ray.mirrored[:, channel], path)
+            straight = system.directional(ray.entering[:, channel], ray.mirrored[:, channel], path, shifts)
+            directed, inverse = directed + straight.first.flux, inverse + straight.first.inverse
+            along = along + straight.first.travel
             found = system.solved(
                 entering[:, channel],
                 None if returned is None else partial(returned, channel=channel),
@@ -404,49 +411,44 @@ class BodySystem:
                 part,
             )
             fluence[:, channel], flux[:, channel], leaving[:, channel], cells[:, channel], taken = found
-            passing[:, channel] = system.through * (flux[:, channel] - straight.flux)
+            passing[:, channel] = system.through * (flux[:, channel] - straight.first.flux)
             inclusions[:, channel] = system.at_inclusions(cells[:, channel], flux[:, channel], straight)
             fluence[:, channel] = system.without_inclusions(fluence[:, channel], inclusions[:, channel])
             scattered[:, channel] = system.scattered
             steps += taken
-        total, directed = flux.sum(axis=1), ray.entering.sum(axis=1)
-        cosine = _mean_cosine(total, directed, path)
-        travel = _mean_direction(total, directed, path, self._grid.face_normals)
+        total = flux.sum(axis=1)
+        cosine, travel = _mean_cosine(total, directed, inverse), _mean_direction(total, directed, along, normals)
         return DiffuseSolution(fluence, flux, cells, inclusions, cosine, travel, leaving, passing, scattered, steps)
 
 
-def _mean_cosine(flux: Array, directed: Array, path: EntryPaths) -> Array:
+def _mean_cosine(flux: Array, directed: Array, inverse: Array) -> Array:
     """(s,): mean cosine of the light that enters, with which 1 / (mu + m) is the mean of all light, at mu = 1/2.
 
-    Of a flux (s,) that enters at the samples, that of paths (k,) has their directions, and the rest is uniform.
+    Of a flux (s,), so much is directed (s,), with an `inverse` (s,) as in `ShiftedEvents`, and the rest is uniform.
     """
-    rays = np.bincount(path.samples, directed, len(flux))
-    inverse = np.bincount(path.samples, directed / (0.5 + path.cosine), len(flux))
-    rest = np.maximum(flux - rays, 0.0)
-    total = np.maximum(rest + rays, np.finfo(np.float64).tiny)
+    rest = np.maximum(flux - directed, 0.0)
+    total = np.maximum(rest + directed, np.finfo(np.float64).tiny)
     mean = (inverse + rest / (0.5 + UNIFORM_COSINE)) / total
     return np.where(mean > 0.0, 1.0 / np.where(mean > 0.0, mean, 1.0) - 0.5, UNIFORM_COSINE)
 
 
-def _mean_direction(flux: Array, directed: Array, path: EntryPaths, normals: Array) -> Array:
+def _mean_direction(flux: Array, directed: Array, travel: Array, normals: Array) -> Array:
     """(s, 3): mean direction of the light that enters at samples with normals (s, 3), as of `_mean_cosine`."""
-    rays = np.stack([np.bincount(path.samples, directed * part, len(flux)) for part in path.directions.T], axis=1)
-    rest = np.maximum(flux - np.bincount(path.samples, directed, len(flux)), 0.0)
+    rest = np.maximum(flux - directed, 0.0)
     # 2/3 is the mean cosine of uniform light.
-    total = np.maximum(flux, np.finfo(np.float64).tiny)[:, None]
-    return np.asarray((rays - 2.0 / 3.0 * rest[:, None] * normals) / total)
+    total = np.maximum(rest + directed, np.finfo(np.float64).tiny)[:, None]
+    return np.asarray((travel - 2.0 / 3.0 * rest[:, None] * normals) / total)
 
 
 @dataclass(frozen=True, eq=False)
 class _DirectionalEffects:
-    """Effects of entering rays in one channel: flux, reflected flux and fluence at samples (s,), power in the cells.
+    """Effects of entering rays in one channel: first events and reflected flux at samples (s,), power in the cells.
 
     And fluence in walls (s,), and the power that comes to the samples of inclusions (i,) unscattered.
     """
 
-    flux: Array
+    first: ShiftedEvents
     mirrored: Array
-    near: Array
     slab: Array
     power: Array
     reaching: Array
@@ -480,9 +482,9 @@ class _ChannelSystem:
         d = float(diffusion_coefficient(absorption, scattering))
         self._read, depth = grid.below[0], dense.depth
         spread = grid.spread * (self._read @ dense.cells)
-        layer = LayerSolution.of(depth, float(np.sqrt(absorption / d)), interface.conductance / d, spread)
-        self._relative = 1.0 / layer.u
-        self._attenuated = layer.scale * self._relative
+        curvature = grid.curvature * np.where(depth > 0.0, grid.below[1] / np.where(depth > 0.0, depth, 1.0), 0.0)
+        layer = LayerSolution.of(depth, float(np.sqrt(absorption / d)), interface.conductance / d, spread, curvature)
+        self._attenuated = layer.at_surface
         # 4 V / S is the mean chord (Cauchy).
         chord = 4.0 * float(dense.cells @ grid.volumes) / (grid.area * len(depth))
         # Of diffusion, and of all events.
@@ -500,7 +502,7 @@ class _ChannelSystem:
         self._diffuse = diffuse.scaled(fewer * (float(grid.areas @ scattered) / total))
         reflected = np.zeros(0) if reflected is None else reflected
         self._inclusions = _InclusionLosses.of(grid, absorption, d, reflected)
-        lost = grid.areas * d * layer.slope * self._relative
+        lost = grid.areas * d * layer.conductance
         absorbing = np.maximum(grid.cores, _LEAST_ABSORBING * grid.volumes)
         absorbed = absorption * dense.cells * absorbing
         lost = np.concatenate([lost, self._inclusions.lost])
@@ -602,22 +604,27 @@ class _ChannelSystem:
         mean = self._chord / (2.0 * self._grid.body.mean_thickness)
         return self._grid.escape_paths(self._ior).probability(extinction * mean)
 
-    def directional(self, entering: Array, mirrored: Array, paths: EntryPaths) -> _DirectionalEffects:
+    def directional(
+        self, entering: Array, mirrored: Array, paths: EntryPaths, shifts: Sequence[LateralShift]
+    ) -> _DirectionalEffects:
         """Effects of rays that enter with a flux (k,), and are reflected with another: first events on their paths."""
-        events, count = self._first.of(paths), len(self._grid.points)
-
-        def at_samples(values: Array) -> Array:
-            return np.asarray(np.bincount(paths.samples, values, count), np.float64)
-
-        power, near = events.power(self._grid, paths.samples, entering), events.near * entering
+        count = len(self._grid.points)
+        if not len(paths.samples):
+            none, cells, inclusions = np.zeros(count), np.zeros(self._grid.count), np.zeros(len(self._inclusions.lost))
+            first = ShiftedEvents(none, none, np.zeros((count, 3)), none, none)
+            return _DirectionalEffects(first, none, none, cells, inclusions)
+        events = self._first.of(paths)
+        first = self._first.shifted(paths, events, entering, shifts)
+        power = events.power(self._grid, paths.samples, entering, first.above)
         reaching = self._inclusions.reaching(self._grid, paths, events.reached * entering)
         power = power + self._inclusions.sent(reaching)
         slab = self._in_walls((events.slab[0] * entering, events.slab[1] * entering), paths.samples)
-        return _DirectionalEffects(at_samples(entering), at_samples(mirrored), at_samples(near), slab, power, reaching)
+        reflected = np.asarray(np.bincount(paths.samples, mirrored, count), np.float64)
+        return _DirectionalEffects(first, reflected, slab, power, reaching)
 
     def at_inclusions(self, cells: Array, flux: Array, straight: _DirectionalEffects) -> Array:
         """Irradiance at the samples of inclusions (i,), for what `solved` finds."""
-        uniform = self._diffuse.reached * (flux - straight.flux)
+        uniform = self._diffuse.reached * (flux - straight.first.flux)
         reaching = self._inclusions.reaching(self._grid, self._paths, uniform) + straight.reaching
         return np.asarray(self._brighter * self._inclusions.diffuse(cells, reaching) + reaching / self._inclusions.area)
 
@@ -662,7 +669,7 @@ class _ChannelSystem:
         correction = self._correction * (self._uniform[2] if emission > 0.0 else 1.0)
 
         def at_surface(cells: Array, flux: Array) -> Array:
-            fluence = (self._read @ cells) * self._attenuated + self._diffuse.near * flux + straight.near
+            fluence = (self._read @ cells) * self._attenuated + self._diffuse.near * flux + straight.first.near
             if walls:
                 own, across = self._diffuse.slab
                 fluence = self._with_walls(
@@ -695,7 +702,7 @@ class _ChannelSystem:
             again = float(change @ before) / max(float(before @ before), np.finfo(np.float64).tiny)
             again = min(max(again, 0.0), MOST_RETURNED)
             flux = np.maximum(flux + change / (1.0 - again), 0.0)
-            most = np.abs(flux + straight.flux).max(initial=0.0)
+            most = np.abs(flux + straight.first.flux).max(initial=0.0)
             largest = np.abs(change).max(initial=0.0)
             if tolerance == last and largest <= min(ENOUGH / part, MOST_MISSED) * (1.0 - again) * most:
                 break
@@ -705,7 +712,7 @@ class _ChannelSystem:
         even = emitted / np.maximum(self._uniform[1], _TINY) if part == 1.0 and emission > 0.0 else 0.0
         return (
             fluence,
-            flux + straight.flux + even,
+            flux + straight.first.flux + even,
             leaving(fluence, flux),
             np.maximum(near, 0.0) + emitted_inside,
             steps,
@@ -745,8 +752,8 @@ class _InclusionLosses:
             return cls(sparse.csr_array((0, grid.count)), np.zeros(0), np.zeros(0), np.zeros(0), 1.0)
         condition = (1.0 - reflected) / (2.0 * (1.0 + reflected)) / d
         layer = LayerSolution.of(inner.depth, float(np.sqrt(absorption / d)), condition, inner.spread)
-        lost = inner.area * d * layer.slope / layer.u
-        return cls(inner.read, layer.scale / layer.u, lost, reflected, inner.area)
+        lost = inner.area * d * layer.conductance
+        return cls(inner.read, layer.at_surface, lost, reflected, inner.area)
 
     def diffuse(self, cells: Array, reaching: Array) -> Array:
         """(i,): irradiance by diffuse light, for a fluence (cells,) and a power (i,) that comes unscattered."""
