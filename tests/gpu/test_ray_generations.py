@@ -6,6 +6,7 @@ import dataclasses
 import sys
 import warnings
 from collections.abc import Callable, Iterator
+from importlib.metadata import PackageNotFoundError
 from typing import Any
 
 import moderngl
@@ -199,6 +200,14 @@ def test_what_cannot_be_had_is_refused_or_told(renderer: tl.Renderer, monkeypatc
     monkeypatch.undo()
     monkeypatch.setattr("translucent.geometry.ray_caster._embreex_version", lambda: "2.17.7")
     assert "embreex has version 2.17.7, older than 4.4" in str(tl.plan(scene, capabilities=software))
+    monkeypatch.setattr("translucent.geometry.ray_caster._embreex_version", lambda: "4.4rc1")
+    assert tl.plan(scene, capabilities=software).hits == "embree"
+
+    def no_metadata() -> str:
+        raise PackageNotFoundError("embreex")
+
+    monkeypatch.setattr("translucent.geometry.ray_caster._embreex_version", no_metadata)
+    assert "embreex cannot be imported" in str(tl.plan(scene, capabilities=software))
 
 
 def test_a_shader_that_fails_in_mid_frame_leaves_the_renderer_usable(

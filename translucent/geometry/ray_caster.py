@@ -6,6 +6,7 @@ Lengths are in radii from the center of what a caster holds, where nothing else 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from functools import cache, cached_property
 from importlib.metadata import version
@@ -433,15 +434,16 @@ def embree_refusal() -> str:
     try:
         import embreex.mesh_construction
         import embreex.rtcore_scene  # noqa: F401
-    except ImportError as error:
+
+        found = _embreex_version()
+    except ImportError as error:  # or there are no metadata
         return f"embreex cannot be imported ({error})"
-    found = _embreex_version()
     return "" if _numbers(found) >= _OLDEST else f"embreex has version {found}, older than 4.4"
 
 
 def _numbers(text: str) -> tuple[int, ...]:
     """The first two numbers of a version."""
-    return tuple(int(part) for part in text.split(".")[:2])
+    return tuple(map(int, re.findall(r"\d+", text)[:2]))
 
 
 def _import_embreex() -> None:
