@@ -9,9 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import translucent as tl
 from tests.command_line import Run
 from translucent.commands import console
+from translucent.commands import render as command
 from translucent.commands.console import ProgressLine, time_text
+from translucent.geometry.solids import Box
 
 pytestmark = pytest.mark.usefixtures("one_renderer")
 
@@ -87,6 +90,19 @@ def test_quick_work_tells_nothing(clock: list[float], capsys: pytest.CaptureFixt
         tell(share)
         clock[0] += 0.3
     assert capsys.readouterr().err == ""
+
+
+def test_many_triangles_are_told_before_they_take_time(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    body = tl.Object(Box((0, 0, 0), (1, 1, 1)).tessellate(1), tl.Medium(absorption=1.0))
+    scene = tl.Scene([body, body], tl.Camera.look_at((0, 0, 9), (0, 0, 0)))
+    command.tell_of_many_faces(scene)
+    monkeypatch.setattr(command, "MANY_FACES", 12)
+    monkeypatch.setattr(command, "PREPARING", 1.0)
+    command.tell_of_many_faces(scene)
+    told = "preparing 12 triangles: up to 12 s of processor time; Ctrl-C stops it"
+    assert capsys.readouterr().err.splitlines() == [told]  # one mesh of two objects
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(3.2, "3 s"), (150.0, "2 min"), (9000.0, "2.5 h")])

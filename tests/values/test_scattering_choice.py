@@ -101,6 +101,11 @@ def test_other_bodies_show_what_they_scatter_once(what: tl.Object) -> None:
     assert not found.says(NoteKind.SPREAD_INSIDE)
 
 
+@pytest.mark.parametrize(("scale", "area"), [((1, 1, 1), 6.0), ((2, 2, 2), 24.0), ((1, 2, 3), 22.0)])
+def test_an_object_has_the_area_of_its_scaled_mesh(scale: tuple[int, ...], area: float) -> None:
+    assert replace(body(), transform=np.diag([*map(float, scale), 1.0])).area == pytest.approx(area)
+
+
 def test_little_scattering_is_shown_once() -> None:
     """By the scattering across the body in its densest channel: of a cube, a third of its side."""
     assert body().mean_thickness == pytest.approx(1 / 3)

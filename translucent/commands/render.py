@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from translucent.commands.console import ProgressLine, echo
+from translucent.commands.console import ProgressLine, echo, time_text
 from translucent.commands.model import (
     ObjectCommand,
     SceneRequest,
@@ -70,6 +70,9 @@ WHITE, BURNT_OUT = 1.02, 0.3
 
 #: Range of the fraction of light that passes in a picture that shows its medium.
 SHOWS_MEDIUM = (0.05, 0.97)
+
+#: Triangles from which on a picture takes long to begin, and seconds of a processor for each, with a software OpenGL.
+MANY_FACES, PREPARING = 1_000_000, 2e-5
 
 #: Metres across, from which on a model is rarely one of a thing that light shines through, and what such are usually.
 LARGE, USUAL = 0.5, (0.01, 1.0)
@@ -245,6 +248,7 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
     with quick_compiles(few and request.method is None and request.caustics is None):
         opened = tl.Renderer(given.backend)
     with opened as renderer:
+        tell_of_many_faces(scene)
         progress = ProgressLine(f"rendering on {renderer.provenance.get('renderer', 'the CPU')}")
         draw = partial(renderer.render_requested, size=pixels, request=request, progress=progress)
         if given.opaque_with is not None:
@@ -507,3 +511,11 @@ def _other_unit(size: np.ndarray, depth: np.ndarray, unit: str, own: bool) -> st
                 f"is the file in {words}? With --unit {name} it is {extent_text(scale * size)}, and {passes:.0%} passes"
             )
     return ""
+
+
+def tell_of_many_faces(scene: Scene) -> None:
+    """Say how long large meshes take before the first progress, and that this can be stopped."""
+    faces = sum(len(mesh.faces) for mesh in {item.mesh for item in scene.objects})
+    if faces >= MANY_FACES:
+        spent = time_text(PREPARING * faces)
+        echo(f"preparing {faces:,} triangles: up to {spent} of processor time; Ctrl-C stops it", err=True)

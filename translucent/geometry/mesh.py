@@ -178,6 +178,11 @@ class Mesh(Frozen):
         return self.diagnosis.volume
 
     @cached_property
+    def area(self) -> float:
+        """Area of the surface in square metres."""
+        return surface_area(self.vertices, self.faces)
+
+    @cached_property
     def face_normals(self) -> Array:
         """(m, 3): unit normals of the faces, towards the side from which they are counter-clockwise; 0 without area."""
         return unit_normals(self.vertices, self.faces)
@@ -254,6 +259,13 @@ def _point(point: npt.ArrayLike) -> Array:
             f"point of shape {found.shape}", "the array holds more than one point", "give one point (x, y, z)"
         )
     return found
+
+
+def surface_area(vertices: Array, faces: npt.NDArray[np.integer]) -> float:
+    """Sum of the areas of triangles by their vertices (n, 3) and faces (m, 3)."""
+    first = vertices[faces[:, 0]]
+    across = np.cross(vertices[faces[:, 1]] - first, vertices[faces[:, 2]] - first)
+    return 0.5 * float(np.linalg.norm(across, axis=1).sum())
 
 
 def unit_normals(vertices: Array, faces: npt.NDArray[np.integer]) -> Array:

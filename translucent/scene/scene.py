@@ -14,7 +14,7 @@ import numpy.typing as npt
 from translucent.arguments import checked, vectors
 from translucent.arrays import Array, Frozen, Mask
 from translucent.errors import InputError
-from translucent.geometry.mesh import MAX_COORDINATE, Mesh
+from translucent.geometry.mesh import MAX_COORDINATE, Mesh, surface_area
 from translucent.media.colors import ColorLike, reflectance
 from translucent.media.density import Density
 from translucent.media.medium import MAX_EMISSION, Medium
@@ -218,9 +218,11 @@ class Object(Frozen):
     @cached_property
     def area(self) -> float:
         """Area of the surface in square metres."""
-        corners = (self.mesh.vertices @ self.matrix[:3, :3].T)[self.mesh.faces]
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return 0.5 * float(np.linalg.norm(across, axis=1).sum())
+        linear = self.matrix[:3, :3]
+        squared = linear.T @ linear
+        if np.allclose(squared, squared[0, 0] * np.eye(3), rtol=0.0, atol=1e-12 * squared[0, 0]):
+            return self.mesh.area * float(squared[0, 0])
+        return surface_area(self.mesh.vertices @ linear.T, self.mesh.faces)
 
     @property
     def has_holes(self) -> bool:
