@@ -397,6 +397,10 @@ class GpuRenderer:
         try:
             yield
         except moderngl.Error as error:
+            if "was released" in str(error):
+                raise RenderError(
+                    "rendering", "the OpenGL context was released during the frame", "create a new renderer"
+                ) from error
             if not any(words in str(error) for words in ("not complete", "cannot create")):
                 raise
             raise RenderError(
