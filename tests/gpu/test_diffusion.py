@@ -13,7 +13,8 @@ import pytest
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.diffusion.cache import FieldCache
-from translucent.diffusion.field import DiffusingBody, DiffusionField
+from translucent.diffusion.field import DiffusingBody
+from translucent.diffusion.solution import DiffuseSolution
 from translucent.formulas.diffuse_interface import half_space_reflectance
 from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.planning import scattering as diffusion
@@ -31,13 +32,13 @@ COARSE = tl.Diffusion(12)
 def solved(monkeypatch: pytest.MonkeyPatch) -> list[tl.Medium]:
     """Media of the bodies for which light was solved for."""
     media: list[tl.Medium] = []
-    original = DiffusingBody.field
+    original = DiffusingBody.solved
 
-    def counted(body: DiffusingBody, *given: Any) -> DiffusionField:
+    def counted(body: DiffusingBody, *given: Any) -> DiffuseSolution:
         media.append(body._medium)
         return original(body, *given)
 
-    monkeypatch.setattr(DiffusingBody, "field", counted)
+    monkeypatch.setattr(DiffusingBody, "solved", counted)
     return media
 
 
