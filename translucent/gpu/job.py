@@ -251,6 +251,8 @@ class FrameJob(CameraView):
         Opaque objects are shaded in a few samples, before all others, which show the mean of these.
     holds_opaque : bool
         That mean is there.
+    has_blurs : bool
+        It has its blurs.
     any_eye : bool
         What is drawn is to fit all cameras.
     projected_depth : bool
@@ -262,7 +264,7 @@ class FrameJob(CameraView):
 
     corner: tuple[int, int] = (0, 0)
     for_map = path_only = two_media = projected_depth = bent_apart = bending = any_eye = False
-    few_opaque = holds_opaque = False
+    few_opaque = holds_opaque = has_blurs = False
     photon_light: tuple[moderngl.Texture, int, tuple[int, int]] | None = None
 
     def __init__(

@@ -174,7 +174,9 @@ def _blurred_opaque(job: FrameJob) -> tuple[moderngl.Texture, moderngl.Texture]:
     if job.bending:
         (radiance,) = job.targets["opaque_mean"].color_attachments
     if any(body.surface is not None and body.surface.roughness > 0 for body in job.scene.bodies):
-        radiance.build_mipmaps()
+        if not job.has_blurs:
+            radiance.build_mipmaps()
+        job.has_blurs = job.bending  # the mean stays as it is
         radiance.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
         radiance.repeat_x = radiance.repeat_y = False
     return axial_depth, radiance

@@ -155,6 +155,7 @@ class TracedInterfacesPass:
         Of a job that is bending, only those in the target of the name `mask`.
         """
         by_generations = job.plan.hits == "embree"
+        part = _unsettled_part(job, part, mask)
         variants = self._with_sums if by_generations else self._variants
         rows = max(MOST_LIGHT // job.targets.size[0], 1) if by_generations else part.scissor[3]
         for row in range(part.bottom, part.top, max(rows, 1)):
@@ -173,7 +174,8 @@ class TracedInterfacesPass:
         job.gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
         job.gl.depth_func = "1"
         entered = job.targets["entered"].color_attachments[0]
-        for mask, name, part in marked:
+        for mask, name, whole in marked:
+            part = _unsettled_part(job, whole, mask)
             self._where_unsettled.bind(entered=entered, unsettled=job.targets[mask].color_attachments[0])
             program = self._where_unsettled.program(MIRROR=name == "mirrored")
             self._where_unsettled.draw_part(part, program, job.targets[name])
@@ -196,6 +198,17 @@ def _pixels(job: FrameJob, part: Part, mask: str) -> Pixels:
     columns, rows = words & 0x7FFF, words >> 15
     within = (columns >= part.left) & (columns < part.right) & (rows >= part.bottom) & (rows < part.top)
     return words[within]
+
+
+def _unsettled_part(job: FrameJob, part: Part, mask: str) -> Part:
+    """What of a part is around the pixels in the target of the name `mask`; all of it where these are not listed."""
+    if not job.bending or mask not in job.unsettled:
+        return part
+    if not len(words := job.unsettled[mask]):
+        return Part(0, 0, 0, 0)
+    columns, rows = words & 0x7FFF, words >> 15
+    left, bottom = max(part.left, int(columns.min())), max(part.bottom, int(rows.min()))
+    return Part(left, bottom, min(part.right, int(columns.max()) + 1), min(part.top, int(rows.max()) + 1))
 
 
 def _shows_more(job: FrameJob) -> bool:
