@@ -249,7 +249,7 @@ def in_a_thread(action: Callable[[], object]) -> BaseException | None:
     return raised[0] if raised else None
 
 
-def test_two_threads_do_not_use_one_renderer_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_renderer_draws_one_picture_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     with tl.Renderer() as renderer:
         expected, met = picture(renderer), []
         read = renderers.GpuRenderer.read
@@ -258,13 +258,17 @@ def test_two_threads_do_not_use_one_renderer_at_once(monkeypatch: pytest.MonkeyP
             with monkeypatch.context() as patch:
                 patch.setattr(renderers.GpuRenderer, "read", read)
                 met.append(in_a_thread(lambda: picture(renderer)))
+                with pytest.raises(tl.RenderError) as raised:
+                    picture(renderer)  # as a progress callback might
+                met.append(raised.value)
             return read(self, *arguments)
 
         monkeypatch.setattr(renderers.GpuRenderer, "read", slow)
         np.testing.assert_array_equal(picture(renderer), expected)
         monkeypatch.undo()
-        assert [str(error) for error in met] == [
-            "rendering; another thread is using this renderer; create one renderer for each thread"
+        assert [str(error) for error in met] == 2 * [
+            "rendering; this renderer is in the middle of another picture; "
+            "create one renderer for each thread, and begin no picture in a progress callback"
         ]
         assert isinstance(met[0], tl.RenderError)
         # One after the other they may.

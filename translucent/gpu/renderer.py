@@ -199,7 +199,7 @@ class GpuRenderer:
         self._pid = os.getpid()
         self._closed = False
         self._interrupted = False
-        self._turn = threading.RLock()
+        self._turn = threading.Lock()
         # A renderer that nobody closed must not keep its memory; the context takes all its objects along.
         self._abandoned = weakref.finalize(self, _release, self.context.gl, os.getpid()) if self.context.owned else None
 
@@ -388,11 +388,13 @@ class GpuRenderer:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """Lock against use by other threads, as the context can be current in one thread only."""
+        """Lock against another frame in mid-frame: of other threads, and of a callback that is told the progress."""
         require_own_process()
         if not self._turn.acquire(blocking=False):
             raise RenderError(
-                "rendering", "another thread is using this renderer", "create one renderer for each thread"
+                "rendering",
+                "this renderer is in the middle of another picture",
+                "create one renderer for each thread, and begin no picture in a progress callback",
             )
         try:
             yield
