@@ -126,7 +126,9 @@ def _with_cavities(mesh: Mesh, middles: Array, axes: Array) -> Mesh:
     points = np.concatenate(vertices)
     opaque = np.ones((count - len(mesh.vertices), 4))
     colors = None if mesh.colors is None else np.concatenate([mesh.colors, opaque])
-    return replace(mesh, vertices=points, faces=np.concatenate(faces), uv=None, colors=colors)
+    added = f"{len(middles)} bubbles of air added by the pattern"
+    changed = replace(mesh, vertices=points, faces=np.concatenate(faces), uv=None, colors=colors)
+    return replace(changed, repairs=(*mesh.repairs, added))
 
 
 def _bubbles(mesh: Mesh, count: int) -> tuple[Array, Array]:
