@@ -374,5 +374,5 @@ class _Clock:
         spent = time.perf_counter() - self._begun
         if not number:
             self._first, self._most = spent - self._outside, max(self.left, 1)
-        rest = (self._samples - 1 - number) * self._first * self.left / self._most
+        rest = (_most(self._samples) - 1 - number) * self._first * self.left / self._most
         self._job.report(0.5 + 0.5 * (spent - self._outside) / (spent - self._outside + rest))
