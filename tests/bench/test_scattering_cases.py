@@ -118,7 +118,8 @@ def test_diffusion_is_nearer_than_layers_and_what_engines_do(
     rows = {row.method: row for row in made.rows if row.kind != "floor"}
     assert not [row.failure or row.refusal for row in rows.values() if row.failure or row.refusal]
     off = {name: row.light.nrmse for name, row in rows.items()}  # type: ignore[union-attr]
-    assert off["Diffusion, resolution 32"] < off["Diffusion, resolution 16"] < 0.06
+    # Layers below the surface are as curved as it is, so a coarse grid is as near as a fine one.
+    assert max(off["Diffusion, resolution 32"], off["Diffusion, resolution 16"]) < 0.025
     assert off["Diffusion, resolution 16"] < 0.5 * off["ScatteringLayer"] < 0.5 * off["layer without inner mirrors"]
     fine = rows["Diffusion, resolution 32"]
     assert fine.light is not None

@@ -65,8 +65,9 @@ def test_nothing_is_seen_of_lossless_bodies_beside_each_other() -> None:
     alone = leaving(ball) + leaving(block)
     for around in ((), (ground(1.0, -0.52),)):
         for found, free in zip(leaving(ball, block, *around), alone, strict=True):
-            assert np.abs((found / free).mean(axis=0) - 1.0).max() < 0.025
-            assert np.sqrt(((found / free - 1.0) ** 2).mean()) < 0.04
+            assert np.abs((found / free).mean(axis=0) - 1.0).max() < 0.03
+            # Light of rays spreads along the surface, and uniform light need not: their parts differ between samples.
+            assert np.sqrt(((found / free - 1.0) ** 2).mean()) < 0.05
 
 
 def test_a_body_in_another_one_does_not_receive_its_light_twice() -> None:
