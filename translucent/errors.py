@@ -100,7 +100,7 @@ def close_names(written: str, known: Iterable[str]) -> list[str]:
 
 
 def closest_name(written: str, known: Iterable[str], otherwise: str) -> str:
-    """The question "did you mean ...?" for the closest known name, or else what is to be done."""
+    """The question "did you mean ...?" for the closest known name; if none is close, the advice `otherwise`."""
     close = get_close_matches(written, list(known), n=1)
     return did_you_mean(close) if close else otherwise
 

@@ -179,7 +179,7 @@ def read_triangles(path: Path, asked: str, allow_outside: bool = False) -> Trian
 
 
 def _parts(stream: BinaryIO, kind: str) -> list[Triangles]:
-    """Triangles of each part of a file, by trimesh, which takes longer to import than a small file to be drawn."""
+    """Triangles of each part of a file. Plain .ply files need no trimesh, whose import takes long."""
     if kind == "ply" and (found := _plain_ply(stream)) is not None:
         return [found]
     trimesh, loaders = import_trimesh(), import_trimesh("trimesh.exchange.load").mesh_loaders
@@ -196,7 +196,7 @@ def _parts(stream: BinaryIO, kind: str) -> list[Triangles]:
 
 
 def _plain_ply(stream: BinaryIO) -> Triangles | None:
-    """Triangles of a binary .ply file that holds no more than these; None of any other file, damaged ones too."""
+    """Triangles of a binary .ply file that holds nothing else; None for any other file, damaged ones included."""
     content = stream.read()
     stream.seek(0)
     if (header := _PLY.match(content)) is None:

@@ -1,5 +1,5 @@
-// Textures of a surface, over the texture coordinates of its mesh. Derivatives are taken: ask before any discard.
-// SURFACE_TEXTURES: it has some.
+// Textures of a surface, over the texture coordinates of its mesh. These functions take derivatives: call them before any discard.
+// SURFACE_TEXTURES: the surface has textures; else all factors are 1.
 
 #if SURFACE_TEXTURES
 uniform sampler2D color_texture;
@@ -34,7 +34,7 @@ vec4 textured_roughness(vec2 uv) { return texture(roughness_texture, texture_coo
 float textured_transmission(vec2 uv) { return texture(transmission_texture, texture_coordinate(TRANSMISSION_TEXTURE, uv)).r; }
 vec3 textured_emission(vec2 uv) { return texture(emissive_texture, texture_coordinate(EMISSIVE_TEXTURE, uv)).rgb; }
 
-// Share of the light of the environment that reaches a point.
+// Fraction of the light of the environment that reaches a point.
 float unoccluded(vec2 uv) {
 #if OCCLUSION
     return texture(occlusion_texture, texture_coordinate(OCCLUSION_TEXTURE, uv)).r;

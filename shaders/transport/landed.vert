@@ -1,6 +1,6 @@
 // Photons as points of the picture, where it shows the surfaces on which they have landed. What each adds to the irradiance
-// of its pixels is its power, over the area that a pixel covers of the plane in which it lies. Each is a
-// square half a pixel wide, in up to four pixels: even light starts on a lattice, and photons without width show its moire.
+// of its pixels is its power, over the area that a pixel covers of the plane in which it lies. Each photon is a square half a
+// pixel wide, in up to four pixels: photons start on a lattice, and without a width they would show its moire in even light.
 
 #include <constants>
 #include <View>
@@ -73,7 +73,7 @@ void main() {
     ivec2 aside = ivec2(gl_VertexID & 1, (gl_VertexID >> 1) & 1);
     vec2 beyond = max(2.0 * abs(off) - 0.5, 0.0);
     vec2 part = mix(1.0 - beyond, beyond, vec2(aside));
-    // Where a pixel shows something else, that of the photon has its part.
+    // Where a neighboring pixel shows another surface, the photon's own pixel gets its part.
     vec2 other = corner + sign(off) * vec2(aside);
     bool inside = all(greaterThanEqual(other, vec2(0.0))) && all(lessThan(other, frame_size.xy));
     if (inside && shows_plane(other, point.xyz, normal, along, behind)) { corner = other; }

@@ -1,7 +1,7 @@
 // One step of a ray in the tree of traced interfaces: from where it starts to the surface that it hits, and the interaction there.
 // Adds the light of what ends, and leaves the ray of the stronger branch and that of the weaker one. Who includes it finds the
 // hits and follows the rays: nothing here depends on the order, nor on the pixel but by arguments. What is absorbed and emitted
-// on each segment is exact. Radiance is basic radiance, L / n^2. ROUGH: some body is. LIGHTS: there are some.
+// on each segment is exact. Radiance is basic radiance, L / n^2. ROUGH: some body is rough. LIGHTS: the scene has some.
 
 #include "lib/color.glsl"
 #include "lib/optics.glsl"
@@ -334,7 +334,7 @@ int interact(inout Ray ray, out Ray weaker, Interaction at, ObjectRow body, Hit 
     return branch(ray, weaker, back, on, again, bare == 1.0, last);
 }
 
-// What a ray is in that hits nothing: where all solids are closed, it has passed an edge by rounding.
+// Empties the interior list of a ray that hits nothing: where all solids are closed, it has missed an edge by rounding.
 void leave_bodies(inout Ray ray, inout int effective) {
     if (all_closed == 0) { return; }
     ray.interior = uvec4(0u);

@@ -1,10 +1,10 @@
-// Pixels whose light from interfaces needs more samples; the others are discarded. After one sample those are whose light is not
-// linear within 5 x 5 pixels. After several, those whose standard error shows, deviation n^(-3/4) of n samples, unless they have as
-// many as is worth it: in proportion to the power 4/5 of the deviation, which takes most off the error of the picture for its time
-// (see adaptive.py). The deviation is the mean within 3 x 3 pixels, and relative to the root of the light there; what shows, the larger of it and the pixel's own. Pixels with the edge
-// of an interface take all samples, as every error of their mean shows. MIRROR: likewise for the light that bodies add to what the
-// ground mirrors, in samples that hit no interface. measures: writes deviations, and discards nothing that differs but edges. Row 0 is
-// the top row.
+// Marks pixels whose light from interfaces needs more samples, and discards the others (see gpu/adaptive.py).
+// After one sample, a pixel needs more if the light within 5 x 5 pixels is not linear. After n samples, it needs more if its
+// standard error shows, deviation n^(-3/4), and it has fewer samples than the best number, which is in proportion to the power
+// 4/5 of the deviation. The deviation is the mean within 3 x 3 pixels, relative to the root of the light there; the error shows by
+// that mean or by the pixel's own deviation, whichever is larger. Pixels with the edge of an interface take all samples, as every
+// error of their mean shows. MIRROR: the same for the light that bodies add to what the ground mirrors, in samples that hit no
+// interface. measures: writes the deviations, and discards edges alone. Row 0 is the top row.
 
 #include <constants>
 #include <View>
@@ -15,7 +15,7 @@ uniform sampler2D bent_spread;     // r: sum of squared luminance; alpha: of the
 uniform sampler2D average_light;   // sum over the samples that hit no interface; alpha: how many these are
 uniform float samples;             // of a pixel
 uniform float most;                // that one may have which shows an interface alone
-uniform float difference;          // largest second difference of light near a pixel that one sample is enough for, as a fraction of its mean
+uniform float difference;          // one sample is enough up to this second difference of light nearby, as a fraction of its mean
 uniform float much_lost;           // fraction of a pixel's light whose loss makes it invalid whatever other samples find
 uniform float error;               // standard error that is as good as none, as a fraction of the light
 uniform float wanted;              // samples of a pixel whose deviation is 1
@@ -26,7 +26,8 @@ layout(location = 0) out float unsettled;
 
 // Largest second difference of the channels of light across a pixel; a neighbor without light counts as the pixel itself.
 float bend(ivec2 at, ivec2 step, ivec2 last, vec3 mean) {
-    vec4 before = texelFetch(bent_light, clamp(at - step, ivec2(0), last), 0), after = texelFetch(bent_light, clamp(at + step, ivec2(0), last), 0);
+    vec4 before = texelFetch(bent_light, clamp(at - step, ivec2(0), last), 0);
+    vec4 after = texelFetch(bent_light, clamp(at + step, ivec2(0), last), 0);
     vec3 off = (before.a > 0.0 ? before.rgb / before.a - mean : vec3(0.0)) + (after.a > 0.0 ? after.rgb / after.a - mean : vec3(0.0));
     off = abs(off);
     return max(off.r, max(off.g, off.b));

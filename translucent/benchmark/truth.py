@@ -189,8 +189,8 @@ def read_records() -> dict[str, TruthRecord]:
     if not path.is_file():
         return {}
 
-    def agreement(told: dict[str, Any]) -> TruthAgreement:
-        known: dict[str, Any] = {key: float("nan") if value is None else value for key, value in told.items()}
+    def agreement(stored: dict[str, Any]) -> TruthAgreement:
+        known: dict[str, Any] = {key: float("nan") if value is None else value for key, value in stored.items()}
         return TruthAgreement(**known)
 
     found = json.loads(path.read_text(encoding="utf-8"))

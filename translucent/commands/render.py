@@ -71,7 +71,8 @@ WHITE, BURNT_OUT = 1.02, 0.3
 #: Range of the fraction of light that passes in a picture that shows its medium.
 SHOWS_MEDIUM = (0.05, 0.97)
 
-#: Triangles from which on a picture takes long to begin, and seconds of a processor for each, with a software OpenGL.
+#: Triangles from which on the first progress takes long, and seconds of processor time for each, with a software
+#: OpenGL.
 MANY_FACES, PREPARING = 1_000_000, 2e-5
 
 #: Metres across, from which on a model is rarely one of a thing that light shines through, and what such are usually.

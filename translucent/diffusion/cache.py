@@ -161,7 +161,7 @@ class FieldCache:
         opaque: OpaqueSurfaces | None,
         diffusion: Diffusion,
     ) -> tuple[dict[int, DiffusingBody], dict[int, tuple[int, ...]]]:
-        """Bodies with surfaces, by number, and the numbers of those that light each."""
+        """Bodies with surfaces, by number, and for each the numbers of the bodies that light it."""
         objects, inside = scene.objects, () if opaque is None else opaque.objects
         inner = {i: inclusions_of(objects[i], inside) for i in media}
         alone = {i: LitBody(self._shape(objects[i], inner[i], diffusion), Occluders(objects[i], opaque)) for i in media}

@@ -111,13 +111,13 @@ BodyHits = Callable[[Array, Array], tuple[Array, Integers]]
 
 @dataclass(frozen=True, eq=False)
 class SampledSurface:
-    """Surface with samples, on which rays find the nearest one: of a body, or of several together.
+    """Surface of one body or of several, and its samples: a ray finds the sample nearest to where it hits.
 
     Attributes
     ----------
     nearest : BodyHits
     count : int
-        Of samples.
+        Number of samples.
     """
 
     nearest: BodyHits
@@ -125,7 +125,7 @@ class SampledSurface:
 
     @classmethod
     def of_all(cls, parts: Sequence[SampledSurface], balls: Sequence[tuple[Array, float]]) -> SampledSurface:
-        """Several surfaces, each in a ball with a center and a radius, as one; samples are counted through."""
+        """Union of surfaces, each in a ball with a center and a radius; samples are numbered one after another."""
         first = np.cumsum([0, *(part.count for part in parts)])
 
         def nearest(origins: Array, directions: Array) -> tuple[Array, Integers]:
@@ -329,7 +329,8 @@ class Exchange:
     others : (s, o) csr_array, optional
         Form factors of the samples of other bodies.
     behind : (s, o) csr_array, optional
-        The same where no sky is seen behind these: light that they let through does not come along rays.
+        The same where something blocks the sky behind them. Elsewhere, rays from the sky through these bodies are
+        already counted as the light that passes.
     """
 
     itself: sparse.csr_array

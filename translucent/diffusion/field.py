@@ -57,10 +57,11 @@ LEAST_SCATTERED = 0.002
 #: at first events. Behind an interface light enters and leaves in a cone, and that angle is about the same for all.
 DIRECTED = 0.05
 
-#: Fraction of the light of bodies that is too little to go on to others, and the most of it that comes back at once.
+#: Mean flux on a body from others, as a fraction of what the brightest sends out, below which it is left out; and the
+#: largest ratio of one round of light between bodies to the round before.
 ENOUGH, MOST_AGAIN = 5e-3, 0.9
 
-#: Largest part of all light that counts as added to other light: then its medium does not emit again.
+#: Largest `part` of light that is added to other light: with 1, `BodySystem.solved` would count emission again.
 MOST_PART = 0.99
 
 #: Fraction of a cell that is inside from which all of it is.
@@ -332,7 +333,7 @@ class DiffusingBody:
 
     @np.errstate(under="ignore")
     def lit_by(self, entering: Array, part: float) -> DiffuseSolution:
-        """Light of the body by a flux (s, 3) that enters; `part` is what it is of all light."""
+        """Light of the body by a flux (s, 3) that enters, which is a fraction `part` of all light."""
         returned, inside = self._exchange.returned if self._exchange.any else None, np.zeros((self.lit.grid.count, 3))
         return self._system.solved(entering, returned, inside, part=part)
 
@@ -434,10 +435,11 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
 def lit_by_each_other(
     bodies: Mapping[int, DiffusingBody], others: Mapping[int, Sequence[int]], found: Mapping[int, DiffuseSolution]
 ) -> dict[int, DiffuseSolution]:
-    """Solutions of bodies, by number, with the light of the `others` that each sees, from those for all other light.
+    """Solutions of bodies, by number, that light each other.
 
-    What bodies receive at first goes on once more (Goral et al. 1984), and the rest in proportion: between two bodies
-    nearly all of it is light that goes to and fro where they are next to each other.
+    `found` are solutions for all other light, and `others` the bodies that each body sees. Two rounds of light between
+    bodies are solved (radiosity, Goral et al. 1984). Further rounds are a geometric series: nearly all of their light
+    goes to and fro between the same near surfaces.
     """
     whole = max((float(one.leaving.mean()) for one in found.values()), default=0.0)
 

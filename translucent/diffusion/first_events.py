@@ -52,8 +52,8 @@ FLAT = 4.0
 #: Reduced albedo below which the reflectance of half-spaces is in proportion to it.
 _LEAST_ALBEDO = 1e-6
 
-#: Most distances between samples by which first events are shifted along the surface; parts of the events of each ray,
-#: with a length of path each; samples that shifted light is interpolated from.
+#: Largest shift of first events along the surface, in distances between samples; number of path lengths that stand for
+#: the events of a ray; and number of samples that shifted light is interpolated from.
 MOST_SHIFTED, SHIFTED_PARTS, INTERPOLATED = 3, 4, 3
 
 #: Bounds of the factor by which rays of one light cover more of the surface than where they enter.
@@ -302,7 +302,7 @@ class LateralShift:
     rays : slice
         Of `joined_rays`.
     step : (s, s) csr_array
-        From a flux at the samples to that after one distance between samples along the rays.
+        Maps a flux at the samples to the flux one distance between samples further along the rays.
     level : (k,) float64
         Distances between samples along the surface for each metre of path.
     chord : (k,) float64
@@ -324,7 +324,7 @@ class LateralShift:
         chord = grid.chords(ray.samples, ray.directions) if matched else np.full(len(level), np.inf)
         return cls(rays, _step(grid, ray.samples, along), level / spacing, chord)
 
-    def shares(self, lengths: Array, weights: Array) -> Array:
+    def fractions(self, lengths: Array, weights: Array) -> Array:
         """(`MOST_SHIFTED` + 1, k): fractions shifted by each number of steps, of path lengths (q, k) in m."""
         place = np.minimum(lengths * self.level, MOST_SHIFTED)
         low = np.minimum(place.astype(np.int64), MOST_SHIFTED - 1)
@@ -356,10 +356,10 @@ def _across(directions: Array, normals: Array) -> Array:
 
 
 def _step(grid: BodyGrid, samples: Integers, along: Array) -> sparse.csr_array:
-    """(s, s): flux at all samples from that one distance between samples before, of rays at samples (k,).
+    """(s, s): map of a flux at the samples to the flux one distance between samples further along the rays.
 
-    They go along the surface (k, 3), and beyond it as the nearest of them. Each sample looks back for what comes to it;
-    rays that spread along the surface bring less.
+    Rays at samples (k,) go `along` the surface (k, 3); samples without a ray take the direction of the nearest one.
+    Each sample interpolates the flux that far back. Rays that spread along the surface bring less.
     """
     count, spacing = len(grid.points), float(np.sqrt(grid.area))
     reach = (MOST_SHIFTED + 1) * spacing
@@ -435,7 +435,7 @@ class ShiftedEvents:
     Attributes
     ----------
     flux : (s,) float64
-        That enters.
+        Flux that enters.
     inverse, travel : (s,), (s, 3) float64
         Sums of this flux over 1/2 and its cosine, and of it times its direction.
     near : (s,) float64
@@ -542,19 +542,19 @@ class FirstEvents:
         for shift in shifts:
             unshifted[shift.rays] = False
             own = samples[shift.rays]
-            parts = self._shares(shift, own, cosine[shift.rays], metres[own])
-            shares = np.stack([parts[0]] * 5 + [*parts[1:]], axis=2)
-            total += shift.moved(shares * values[shift.rays], own)
+            parts = self._fractions(shift, own, cosine[shift.rays], metres[own])
+            fractions = np.stack([parts[0]] * 5 + [*parts[1:]], axis=2)
+            total += shift.moved(fractions * values[shift.rays], own)
         if unshifted.any():
             own = samples[unshifted]
             total += np.stack([np.bincount(own, part, len(total)) for part in values[unshifted].T], axis=1)
         near = grid.smoothed(total[:, 5], float(np.mean(layer.lateral_variance * metres**2)))
         return ShiftedEvents(total[:, 0], total[:, 1], total[:, 2:5], near, grid.areas * total[:, 6])
 
-    def _shares(
+    def _fractions(
         self, shift: LateralShift, samples: Integers, cosine: Array, metres: Array
     ) -> tuple[Array, Array, Array]:
-        """`LateralShift.shares` of all events of rays, of their light at the surface, and of what cells receive."""
+        """`LateralShift.fractions` of all events, of their light at the surface, and of what cells receive."""
         depth, extinction = self._layer.depth[samples], self._extinction
         k = np.broadcast_to(self._layer.attenuation, self._layer.depth.shape)[samples]
         chord = shift.chord / np.where(metres > 0.0, metres, 1.0)
@@ -568,9 +568,9 @@ class FirstEvents:
         near = rest * optics.mean_transmittance(2.0 * k * rest) * np.exp(k * (rest - depth))
         near /= np.maximum(near.sum(axis=0), np.finfo(np.float64).tiny)
         return (
-            shift.shares(lengths * metres, every * even),
-            shift.shares(shallow * metres, inside * near),
-            shift.shares(shallow * metres, inside * even),
+            shift.fractions(lengths * metres, every * even),
+            shift.fractions(shallow * metres, inside * near),
+            shift.fractions(shallow * metres, inside * even),
         )
 
 

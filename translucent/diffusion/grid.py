@@ -61,8 +61,8 @@ INWARD_DIRECTIONS, START = 8, 1e-4
 #: Blocks of cells along the longest side of a grid. The solver corrects the mean error of each.
 BLOCKS = 8
 
-#: Cosine between normals of neighbors, at least, that lie on one rounded surface; and the part of the area around each
-#: by which neighbors must be spread for a slope to count.
+#: Least cosine between the normals of neighboring samples on one smooth surface; and what is added to the squared
+#: distances of neighbors in fits of slopes, as a fraction of a sample's area, so that few neighbors give small slopes.
 SMOOTH, STIFF = 0.5, 1e-2
 
 #: Largest change of a surface's area over the depth of reading, as half of its logarithm: mean curvature times depth.
@@ -183,7 +183,7 @@ class BodyGrid:
 
     @cached_property
     def tree(self) -> cKDTree:
-        """For looking up the samples nearest to a place."""
+        """Tree of the samples, to look up the nearest ones to a place."""
         return cKDTree(self.points)
 
     def crossings(self, ior: float) -> tuple[Array, Array]:
@@ -290,7 +290,7 @@ class BodyGrid:
 
     @cached_property
     def _alike(self) -> tuple[Array, Array]:
-        """(s, n), (s, n, 3): whether samples of `nearest` count, 0 or 1, and metres to them."""
+        """(s, n), (s, n, 3): 1 for samples of `nearest` on the same smooth surface, else 0, and metres to them."""
         alike = (self.normals[self.nearest] * self.normals[:, None]).sum(axis=2) > SMOOTH
         return alike.astype(np.float64), alike[..., None] * (self.points[self.nearest] - self.points[:, None])
 
@@ -308,7 +308,7 @@ class BodyGrid:
 
     @cached_property
     def curvature(self) -> Array:
-        """(s,): mean curvature of the surface in 1/m, as far as `MOST_CURVED` says; positive where it is rounded."""
+        """(s,): mean curvature of the surface in 1/m, limited by `MOST_CURVED`; positive where it is convex."""
         found, most = 0.5 * self.divergence(self.normals), MOST_CURVED / self.below[1]
         return np.asarray(np.clip(found[self.nearest].mean(axis=1), -most, most))
 

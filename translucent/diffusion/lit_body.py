@@ -40,7 +40,7 @@ SAMPLES_FOR_PATH = 4
 #: Form factor of a body, seen from the middle of another one, below which it does not light that one.
 LEAST_FACTOR = 0.01
 
-#: Samples of a body, most of which are inside of another one that is around it.
+#: Number of samples of a body that are tested for being inside another one.
 INSIDE = 7
 
 #: Samples of inclusions that a cell near them takes the mean of, and their largest distance in cells.
@@ -209,7 +209,7 @@ class LitBody:
 
     @cached_property
     def _seen(self) -> tuple[Integers, Integers]:
-        """Pairs (k,) of `Sky` in which another body is, before all else, and its sample, counted through all others."""
+        """Pairs (k,) of `Sky` that hit another body before all else, and its sample, numbered as in `_all_others`."""
         if not self.others:
             return np.zeros(0, np.int64), np.zeros(0, np.int64)
         sky, starts, directions = self.shape.sky, self._starts, self.pose.outwards(self.shape.sky.directions)
@@ -235,7 +235,7 @@ class LitBody:
 
     @property
     def surface(self) -> SampledSurface:
-        """Its samples, for rays of the world."""
+        """Surface of the body with its samples, for rays in the world."""
         return SampledSurface(self.nearest, len(self.grid.points))
 
     @cached_property
@@ -330,7 +330,7 @@ def lit_body(body: Object, opaque: OpaqueSurfaces | None, step: float) -> LitBod
 
 
 def may_light(other: LitBody, body: LitBody) -> bool:
-    """Whether a body is large enough as another one sees it, and not around that one."""
+    """Whether `other` looks large enough from a body to light it, and does not enclose that body."""
     (middle, radius), (center, _) = bounding_ball(other.casters.body), bounding_ball(body.casters.body)
     if radius**2 < LEAST_FACTOR * ((middle - center) ** 2).sum():
         return False

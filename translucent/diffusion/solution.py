@@ -227,7 +227,7 @@ _TINY = np.finfo(np.float64).tiny
 #: Fraction of the probability to escape that is absorbed at least where what uniform light misses is looked for.
 LEAST_ABSORBED = 0.1
 
-#: Least fraction of the fluence that the medium, and no inclusion, scattered last.
+#: Least fraction of the fluence that was last scattered by the medium, and not by an inclusion.
 LEAST_SCATTERED = 0.05
 
 #: Least fraction of a cell's volume that absorbs.
@@ -274,7 +274,7 @@ class DiffuseSolution:
     steps: int
 
     def plus(self, more: DiffuseSolution) -> DiffuseSolution:
-        """Solution for the light of both."""
+        """Sum of two solutions for one body: its light if both fall on it."""
         own, other = self.entering.sum(axis=1), more.entering.sum(axis=1)
         total = np.maximum(own + other, _TINY)
         inverse = (own / (self.cosine + 0.5) + other / (more.cosine + 0.5)) / total
@@ -380,8 +380,8 @@ class BodySystem:
             Power of lights inside each cell, in W.
         rays : sequence of EnteringRays
         part : float
-            What this light is of all light, if it is added to other light: it is solved for less precisely, and the
-            medium does not emit again.
+            This light as a fraction of all light, if it is added to other light: below 1, it is solved less
+            precisely, and the medium does not emit again.
 
         Raises
         ------
@@ -424,7 +424,7 @@ class BodySystem:
 def _mean_cosine(flux: Array, directed: Array, inverse: Array) -> Array:
     """(s,): mean cosine of the light that enters, with which 1 / (mu + m) is the mean of all light, at mu = 1/2.
 
-    Of a flux (s,), so much is directed (s,), with an `inverse` (s,) as in `ShiftedEvents`, and the rest is uniform.
+    The part `directed` (s,) of the flux (s,) has an `inverse` (s,) as in `ShiftedEvents`, and the rest is uniform.
     """
     rest = np.maximum(flux - directed, 0.0)
     total = np.maximum(rest + directed, np.finfo(np.float64).tiny)

@@ -34,13 +34,13 @@ ERROR = 0.017
 #: smooth but for the mirror image, so that less of an error shows.
 MIRROR_ERROR = 0.005
 
-#: Second difference of the light of neighbors to the standard error of one sample in the middle of a pixel. An edge
-#: across a pixel has a difference as large as its step. The sample finds the larger side: its mean error is the step
+#: Ratio of the second difference of neighboring pixels to the standard error of one sample in the middle of a pixel. An
+#: edge across a pixel has a difference as large as its step. The sample finds the larger side: its error is the step
 #: times the smaller part of the pixel, from 0 to 1/2, whose mean square is 1/12. Light that is linear has neither.
 DIFFERENCE_TO_ERROR = 12.0**0.5
 
-#: Samples after which deviations are measured, and the most samples of a pixel, in those of the picture. Fewer of the
-#: picture are all taken.
+#: Samples after which deviations are measured: pictures with no more than these take all. And the most samples of a
+#: pixel, as a multiple of those of the picture.
 FIRST_LOOK, MORE = 3, 2
 
 #: Of rough interfaces, a pixel is isolated that is farther from the median of the eight around it than so many spreads
@@ -248,7 +248,7 @@ def wanted_samples(deviations: Floats, samples: int) -> float:
 
 
 def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """(h, w): pixels far off their neighbors in a picture (h, w), of those all of whose neighbors are inside (h, w)."""
+    """(h, w): pixels of a picture (h, w) far off their neighbors, if these all are `inside` (h, w)."""
     found, (height, width) = np.zeros(level.shape, bool), level.shape
     steps = [(y, x) for y in range(-2, 3) for x in range(-2, 3) if (y, x) != (0, 0)]
     padded = np.pad(inside, 1)
@@ -324,8 +324,8 @@ def traced_samples(job: FrameJob) -> float:
 def _central_first(samples: int) -> list[tuple[float, float]]:
     """Sub-pixel shifts of the samples, the most central first: where surroundings are smooth, it is the only one.
 
-    The next of the first look make with it those whose mean is nearest to that of all samples where light varies as a
-    polynomial of degree 2. Those of the pixels that take more follow, whose mean is in the middle, too.
+    The others of the first look come next: of all choices, their mean with the first is nearest to that of all samples
+    where light is a polynomial of degree 2. Last come those of pixels that take more samples than the picture.
     """
     shifts, more = sample_shifts(samples), sobol_points(_most(samples))[samples:]
     nearest = int(np.argmin(np.square(shifts).sum(axis=1)))

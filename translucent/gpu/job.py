@@ -252,7 +252,7 @@ class FrameJob(CameraView):
     holds_opaque : bool
         That mean is there.
     has_blurs : bool
-        It has its blurs.
+        That mean has its blurred levels.
     any_eye : bool
         What is drawn is to fit all cameras.
     projected_depth : bool

@@ -388,7 +388,7 @@ class GpuRenderer:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """Lock against another frame in mid-frame: of other threads, and of a callback that is told the progress."""
+        """Refuse to begin a frame during another one, in another thread or in a progress callback."""
         require_own_process()
         if not self._turn.acquire(blocking=False):
             raise RenderError(

@@ -324,7 +324,7 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
         ground = ground_below(scene, [i for i, body in enumerate(scene.objects) if body in bodies])
         beside = [item for item in scene.opaque if not any(_may_hold(body, item) for body in bodies)]
         if others := [item for item in beside if ground is None or item is not ground.ground]:
-            text += f"; up to 10 % too dark are {object_names(others)}, which light from these bodies does not reach"
+            text += f"; light from these bodies does not reach {object_names(others)}: up to 10 % too dark there"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     return notes
 

@@ -506,8 +506,8 @@ def _map_plans(scene: Scene, found: RenderPlan, machine: Capabilities) -> tuple[
 
     They are kept until objects change: lights and cameras do more often.
     """
-    # Where all bodies are drawn as sheets, these throw the shadows, too. No validity is kept of shadows: a sum will do
-    # where intervals would only tell which pixels are wrong.
+    # Where all bodies are drawn as sheets, they throw shadows as sheets, too. Shadows have no per-pixel validity: sums
+    # of signed depths suffice where intervals would only find which pixels are wrong.
     method = found.method if found.method.makes_sheets else None
     if method is None and scene.overlap == "add" and not scene.varies and _undecided_by_sums(scene):
         method = SignedDepth()

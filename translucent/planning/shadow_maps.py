@@ -66,7 +66,7 @@ class ShadowMaps:
 
 
 def usual_maps(scene: Scene) -> tuple[ShadowMaps, tuple[Note, ...]]:
-    """Shadow maps that nobody requested, and a note where they are narrower because rays cross many surfaces.
+    """Default shadow maps of a scene, with a note if they are narrower because rays cross many surfaces.
 
     Of all lines through a box of area S, surfaces in it of area A are crossed 2 A / S times on average (Cauchy 1850).
     """

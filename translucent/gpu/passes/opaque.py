@@ -160,7 +160,7 @@ def set_surface(view: CameraView, program: moderngl.Program, surface: Surface, h
     """Set the surface of an object for ``shaders/shade/opaque_surface.glsl``, with holes where alpha is below that."""
     view.resources.textures.bind(surface, program, len(_MAPS))
     set_uniform(program, "opaque_hole_below", hole_below)
-    # Not all are where an object only emits light, or only its depth is needed.
+    # Programs of objects that only emit light, and of depth alone, lack some of these.
     if (values := _UNIFORMS.get(surface)) is None:
         fields = {name: np.asarray(value, np.float64) for name, value in surface_fields(surface).items()}
         values = {f"opaque_{name}": one.item() if one.ndim == 0 else tuple(one) for name, one in fields.items()}

@@ -201,7 +201,7 @@ def _pixels(job: FrameJob, part: Part, mask: str) -> Pixels:
 
 
 def _unsettled_part(job: FrameJob, part: Part, mask: str) -> Part:
-    """What of a part is around the pixels in the target of the name `mask`; all of it where these are not listed."""
+    """Bounds of the unsettled pixels of a mask within a part; the whole part if these pixels are not listed."""
     if not job.bending or mask not in job.unsettled:
         return part
     if not len(words := job.unsettled[mask]):

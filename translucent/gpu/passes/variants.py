@@ -98,7 +98,7 @@ class Variants:
         self._draw_parts(program, framebuffer, (part if rows is None else part.rows(*rows),))
 
     def draw_part(self, part: Part, program: moderngl.Program, framebuffer: moderngl.Framebuffer) -> None:
-        """Run one of the programs for the pixels of a part, whose rows are counted as they are written."""
+        """Run one of the programs for the pixels of a part; rows of the part count up as in the framebuffer."""
         self._draw_parts(program, framebuffer, (part,))
 
     def draw_rest(
