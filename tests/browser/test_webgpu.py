@@ -21,7 +21,7 @@ SMALL = (128, 128)
 BALL = rounded(Sphere().tessellate())
 SAGITTA = 2 * Sphere().sagitta()
 #: Meshes of other people, which the project does not hold.
-HELD = Path("/work/shared/assets/meshes_clean")
+HELD = Path(__file__).parents[3] / "shared" / "assets" / "meshes_clean"
 
 #: A renderer for all tests of the page, and what a node finds of a scene.
 BEGIN = """async () => {

@@ -8,10 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 import translucent as tl
+from translucent.diffusion.entering_rays import EnteringRays
 from translucent.diffusion.field import DiffusingBody, DiffusionField
-from translucent.diffusion.first_events import (
-    EnteringRays,
-)
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.lit_body import lit_body
 from translucent.diffusion.solution import BodySystem, DiffuseSolution

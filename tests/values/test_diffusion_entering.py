@@ -33,9 +33,9 @@ from translucent.diffusion.entering import (
     opaque_surfaces,
     sky_light,
 )
+from translucent.diffusion.entering_rays import EnteringRays, joined_rays
 from translucent.diffusion.environment_ahead import behind_body
 from translucent.diffusion.field import DiffusingBody, DiffusionField
-from translucent.diffusion.first_events import EnteringRays, joined_rays
 from translucent.diffusion.grid import other_plane_points, plane_points
 from translucent.diffusion.lit_body import lit_body
 from translucent.formulas import optics

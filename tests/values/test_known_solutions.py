@@ -10,8 +10,8 @@ from scipy import sparse
 
 import translucent as tl
 from translucent.diffusion import field
+from translucent.diffusion.entering_rays import EnteringRays
 from translucent.diffusion.field import DiffusingBody
-from translucent.diffusion.first_events import EnteringRays
 from translucent.diffusion.grid import body_grid
 from translucent.diffusion.lit_body import lit_body
 from translucent.diffusion.solution import MOST, TOLERANCE, BodySystem, KnownSolutions

@@ -13,8 +13,8 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask
+from translucent.diffusion.entering_rays import EnteringRays
 from translucent.diffusion.exchange import OpaqueSurfaces
-from translucent.diffusion.first_events import EnteringRays
 from translucent.diffusion.grid import BodyGrid, other_plane_points
 from translucent.diffusion.keys import may_dim
 from translucent.diffusion.photons import EnteringPhotons

@@ -22,9 +22,9 @@ from translucent.diffusion.entering import (
     sky_light,
     suns_of,
 )
+from translucent.diffusion.entering_rays import EnteringRays, joined_rays
 from translucent.diffusion.environment_ahead import EnvironmentAhead
 from translucent.diffusion.exchange import Patches, direct_irradiance
-from translucent.diffusion.first_events import EnteringRays, joined_rays
 from translucent.diffusion.grid import BodyGrid
 from translucent.diffusion.keys import dimming_key, environment_key, kept, light_key, may_dim
 from translucent.diffusion.lit_body import LitBody

@@ -14,10 +14,10 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers
 from translucent.diffusion.densities import Densities
+from translucent.diffusion.entering_rays import EnteringRays, LateralShift
 from translucent.diffusion.grid import BodyGrid, box_points
 from translucent.diffusion.walls import SlabSolution
 from translucent.formulas import optics
@@ -52,46 +52,11 @@ FLAT = 4.0
 #: Reduced albedo below which the reflectance of half-spaces is in proportion to it.
 _LEAST_ALBEDO = 1e-6
 
-#: Largest shift of first events along the surface, in distances between samples; number of path lengths that stand for
-#: the events of a ray; and number of samples that shifted light is interpolated from.
-MOST_SHIFTED, SHIFTED_PARTS, INTERPOLATED = 3, 4, 3
-
-#: Bounds of the factor by which rays of one light cover more of the surface than where they enter.
-LEAST_SPREAD, MOST_SPREAD = 0.5, 2.0
+#: Number of path lengths for the first events of a ray that are shifted along the surface.
+SHIFTED_PARTS = 4
 
 #: Cosines of light inside with the normal between which what half-spaces reflect of it is interpolated.
 _COSINES = np.linspace(0.0, 1.0, 513)
-
-
-@dataclass(frozen=True, eq=False)
-class EnteringRays:
-    """Rays of one light, or of a part of the environment, that enter a body: one at each sample that it reaches.
-
-    Attributes
-    ----------
-    samples : (k,) int
-        Numbers of the samples that it reaches.
-    directions : (k, 3) float64
-        Inside, unit vectors.
-    entering, mirrored : (k, 3) float64
-        Flux that enters, and flux that the surface reflects, in W/m^2.
-    from_one : bool
-        True if all come from one light, with one ray at a sample: neighboring rays have about the same direction.
-    """
-
-    samples: Integers
-    directions: Array
-    entering: Array
-    mirrored: Array
-    from_one: bool = False
-
-
-def joined_rays(rays: Sequence[EnteringRays]) -> EnteringRays:
-    """All rays of several lights."""
-    nothing = EnteringRays(np.zeros(0, np.int64), *np.zeros((3, 0, 3)))
-    parts = zip(*((ray.samples, ray.directions, ray.entering, ray.mirrored) for ray in (nothing, *rays)), strict=True)
-    samples, directions, entering, mirrored = map(np.concatenate, parts)
-    return EnteringRays(samples, directions, entering, mirrored)
 
 
 #: Fraction of the fluence below a surface that the spread of what is read leaves at least.
@@ -287,98 +252,6 @@ def entry_paths(ray: EnteringRays, grid: BodyGrid, dense: Densities) -> EntryPat
     """Paths of entering rays below the surface."""
     cosine = np.clip(-(ray.directions * grid.face_normals[ray.samples]).sum(axis=1), LEAST_COSINE, 1.0)
     return EntryPaths.of(grid, dense, ray.samples, ray.directions, cosine, diffuse=False)
-
-
-@dataclass(frozen=True, eq=False)
-class LateralShift:
-    """Shift of the first events of one light along the surface, from where its rays enter to where they are scattered.
-
-    A layer in one dimension scatters light below the place where it enters. Light at a slant has gone on along the
-    surface by about a free path, out of a brighter part into a darker one: where light grazes a rounded body none of it
-    enters, and all that is scattered there comes from beside.
-
-    Attributes
-    ----------
-    rays : slice
-        Of `joined_rays`.
-    step : (s, s) csr_array
-        Maps a flux at the samples to the flux one distance between samples further along the rays.
-    level : (k,) float64
-        Distances between samples along the surface for each metre of path.
-    chord : (k,) float64
-        Metres after which rays leave the body without an interface; else inf.
-    """
-
-    rays: slice
-    step: sparse.csr_array
-    level: Array
-    chord: Array
-
-    @classmethod
-    def of(cls, grid: BodyGrid, ray: EnteringRays, rays: slice, ior: float) -> LateralShift:
-        """Shift of the rays of one light."""
-        spacing = np.sqrt(grid.area)
-        along = _across(ray.directions, grid.face_normals[ray.samples])
-        level = np.linalg.norm(along, axis=1)
-        matched = ior == 1.0
-        chord = grid.chords(ray.samples, ray.directions) if matched else np.full(len(level), np.inf)
-        return cls(rays, _step(grid, ray.samples, along), level / spacing, chord)
-
-    def fractions(self, lengths: Array, weights: Array) -> Array:
-        """(`MOST_SHIFTED` + 1, k): fractions shifted by each number of steps, of path lengths (q, k) in m."""
-        place = np.minimum(lengths * self.level, MOST_SHIFTED)
-        low = np.minimum(place.astype(np.int64), MOST_SHIFTED - 1)
-        found, ray = np.zeros((MOST_SHIFTED + 1, len(self.level))), np.arange(len(self.level))
-        for one, fraction, weight in zip(low, place - low, weights, strict=True):
-            found[one, ray] += weight * (1.0 - fraction)
-            found[one + 1, ray] += weight * fraction
-        return found
-
-    def moved(self, values: Array, samples: Integers) -> Array:
-        """(s, n): values (`MOST_SHIFTED` + 1, k, n) of rays at samples (k,), shifted by each number of steps."""
-        total = np.zeros((self.step.shape[0], values.shape[2]))
-        for own in values[::-1]:
-            total = self.step @ total
-            total[samples] += own
-        return total
-
-
-def lateral_shifts(grid: BodyGrid, rays: Sequence[EnteringRays], ior: float) -> list[LateralShift]:
-    """Shifts of rays in the order of `joined_rays`, for those of one light each."""
-    ends = np.cumsum([0, *(len(ray.samples) for ray in rays)]).tolist()
-    parts = zip(rays, map(slice, ends[:-1], ends[1:]), strict=True)
-    return [LateralShift.of(grid, ray, part, ior) for ray, part in parts if ray.from_one and len(ray.samples)]
-
-
-def _across(directions: Array, normals: Array) -> Array:
-    """(k, 3): parts of directions (k, 3) along the surface with normals (k, 3)."""
-    return np.asarray(directions - (directions * normals).sum(axis=1, keepdims=True) * normals)
-
-
-def _step(grid: BodyGrid, samples: Integers, along: Array) -> sparse.csr_array:
-    """(s, s): map of a flux at the samples to the flux one distance between samples further along the rays.
-
-    Rays at samples (k,) go `along` the surface (k, 3); samples without a ray take the direction of the nearest one.
-    Each sample interpolates the flux that far back. Rays that spread along the surface bring less.
-    """
-    count, spacing = len(grid.points), float(np.sqrt(grid.area))
-    reach = (MOST_SHIFTED + 1) * spacing
-    far, nearest = cKDTree(grid.points[samples]).query(grid.points, distance_upper_bound=reach)
-    receivers = np.flatnonzero(np.isfinite(far))
-    normals, travel = grid.face_normals[receivers], np.zeros((count, 3))
-    towards = _across(along[nearest[receivers]], normals)
-    towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-    travel[receivers] = towards
-    around = min(INTERPOLATED, count)
-    apart, found = grid.tree.query(grid.points[receivers] - spacing * towards, around)
-    apart, found = apart.reshape(-1, around), found.reshape(-1, around)
-    facing = (grid.face_normals[found] * normals[:, None]).sum(axis=2) > 0.0
-    weight = facing / (apart**2 + (0.1 * spacing) ** 2)
-    spread = np.clip(1.0 + spacing * grid.divergence(travel)[receivers], LEAST_SPREAD, MOST_SPREAD)
-    weight /= np.maximum(weight.sum(axis=1) * spread, np.finfo(np.float64).tiny)[:, None]
-    starts = np.zeros(count + 1, np.int64)
-    starts[receivers + 1] = around
-    return sparse.csr_array((weight.ravel(), found.ravel(), np.cumsum(starts)), (count, count))
 
 
 @dataclass(frozen=True, eq=False)

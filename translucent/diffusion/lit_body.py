@@ -24,8 +24,8 @@ from translucent.diffusion.entering import (
     sky_paths,
     transfer,
 )
+from translucent.diffusion.entering_rays import EnteringRays
 from translucent.diffusion.exchange import Exchange, OpaqueSurfaces, Patches, SampledSurface
-from translucent.diffusion.first_events import EnteringRays
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.sides import SurfaceSides
 from translucent.diffusion.walls import Walls

@@ -25,17 +25,14 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from translucent.arrays import Array, Integers
 from translucent.diffusion.densities import Densities, even_densities
+from translucent.diffusion.entering_rays import EnteringRays, LateralShift, joined_rays, lateral_shifts
 from translucent.diffusion.first_events import (
-    EnteringRays,
     EntryPaths,
     FirstEvents,
-    LateralShift,
     LayerSolution,
     ShiftedEvents,
     diffuse_paths,
     entry_paths,
-    joined_rays,
-    lateral_shifts,
     scattered_fractions,
     seen_inclusions,
 )
