@@ -49,3 +49,8 @@ class Frozen:
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
         self.__dict__.update(state)
+
+    def _freeze(self, field: str, array: npt.NDArray[Any]) -> None:
+        """Set a field of a frozen dataclass to an array, and make this read-only."""
+        array.setflags(write=False)
+        object.__setattr__(self, field, array)

@@ -124,10 +124,6 @@ class Mesh(Frozen):
             )
         return array
 
-    def _freeze(self, field: str, array: npt.NDArray[Any]) -> None:
-        array.setflags(write=False)
-        object.__setattr__(self, field, array)
-
     @classmethod
     def _adopted(cls, thing: Any) -> Mesh | None:
         """Mesh of one of another library, for `checked`: all public functions that take a mesh take these, too."""

@@ -113,8 +113,7 @@ def payload(
         "spectral_maps": spectral_maps,
         "aliases": aliases,
         "variants": {
-            key: _variant_entry(frame, rendered, gl, into, kept, spectral_maps)
-            for key, (rendered, frame) in frames.items()
+            key: _variant_entry(frame, rendered, gl, into, spectral_maps) for key, (rendered, frame) in frames.items()
         },
     }
     sections = _Sections(gl, into, kept)
@@ -331,12 +330,7 @@ def _hierarchies_entry(recorder: FrameRecorder, scene: Scene, into: Container) -
 
 
 def _variant_entry(
-    frame: RecordedFrame,
-    scene: Scene,
-    gl: RecordingContext,
-    into: Container,
-    kept: frozenset[int],
-    spectral_maps: bool,
+    frame: RecordedFrame, scene: Scene, gl: RecordingContext, into: Container, spectral_maps: bool
 ) -> dict[str, Any]:
     features = FrameFeatures(frame.plan)
     roles = BodyRoles.of(features, face_counts(scene, int(INFO["GL_SUBPIXEL_BITS"])))

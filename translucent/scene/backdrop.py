@@ -92,10 +92,6 @@ class Backdrop(Frozen):
         """(width, height) in pixels."""
         return self.depth.shape[1], self.depth.shape[0]
 
-    def _freeze(self, field: str, array: npt.NDArray[Any]) -> None:
-        array.setflags(write=False)
-        object.__setattr__(self, field, array)
-
 
 def _numbers(field: str, value: npt.ArrayLike, dtype: Any) -> npt.NDArray[Any]:
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -102,10 +102,6 @@ class Texture(Frozen):
         upper = self.pixels[rows[0], columns[0]] * (1 - right_weight) + self.pixels[rows[0], columns[1]] * right_weight
         lower = self.pixels[rows[1], columns[0]] * (1 - right_weight) + self.pixels[rows[1], columns[1]] * right_weight
         return np.asarray(upper * (1 - low_weight) + lower * low_weight)
-
-    def _freeze(self, field: str, array: npt.NDArray[Any]) -> None:
-        array.setflags(write=False)
-        object.__setattr__(self, field, array)
 
 
 def _wrapped(index: npt.NDArray[np.int64], size: int, wrap: Wrap) -> npt.NDArray[np.int64]:
