@@ -16,6 +16,7 @@ from translucent.geometry.mesh import Mesh
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.layout import BLOCKS, BODY, BODY_STRIDE
 from translucent.gpu.lifting import lift
+from translucent.gpu.shaders import gather
 
 _UNIFORM = re.compile(r"^uniform\s+(\w+)\s+(\w+)\s*(?:\[(\w+)\])?\s*;", re.MULTILINE)
 _BLOCK = re.compile(r"^layout\(std140, row_major\) uniform (\w+) \{", re.MULTILINE)
@@ -503,8 +504,9 @@ def _es(text: str) -> tuple[str, tuple[str, ...]]:
     """
     named = _NAMED.search(text)
     assert named is not None
-    head = text.partition("#line")[0]
-    lifted = lift(named[1], {key: int(value) for key, value in _DEFINE.findall(head)}, "webgl2").text
+    switches = gather(named[1]).switches  # other definitions are constants
+    given = {key: int(value) for key, value in _DEFINE.findall(text.partition("#line")[0]) if key in switches}
+    lifted = lift(named[1], given, "webgl2").text
     row = "uniform int hierarchy_triangle_row;"
     merged, found = re.subn(r"^uniform usampler2D hierarchy_triangles;", row, lifted, flags=re.MULTILINE)
     of_nodes = "texelFetch(hierarchy_nodes, ivec2(0, hierarchy_triangle_row) + "
