@@ -16,7 +16,7 @@ import numpy as np
 
 import translucent as tl
 from translucent.assets import mesh_path
-from translucent.diffusion import solution
+from translucent.diffusion import cell_system
 from translucent.diffusion.field import DiffusingBody
 from translucent.diffusion.lit_body import lit_body
 
@@ -56,8 +56,8 @@ def main() -> None:
         return timing
 
     with (
-        patch.object(solution, "cg", timed("solver", solution.cg)),
-        patch.object(solution, "_balance", timed("matrix", solution._balance)),
+        patch.object(cell_system, "cg", timed("solver", cell_system.cg)),
+        patch.object(cell_system, "_balance", timed("matrix", cell_system._balance)),
     ):
         body = bear(1.0)
         geometry = lit_body(body, None, tl.Diffusion(asked.resolution).cell_size(body))

@@ -20,6 +20,7 @@ from tests.values.diffusing import (
     seen_field,
 )
 from translucent.bench.shapes import joined
+from translucent.diffusion.cell_system import TOLERANCE
 from translucent.diffusion.densities import even_densities
 from translucent.diffusion.entering import from_light
 from translucent.diffusion.field import DiffusionField
@@ -33,7 +34,7 @@ from translucent.diffusion.first_events import (
 )
 from translucent.diffusion.grid import BodyGrid
 from translucent.diffusion.lit_body import lit_body
-from translucent.diffusion.solution import TOLERANCE, BodySystem, _ChannelSystem
+from translucent.diffusion.solution import BodySystem, _ChannelSystem
 from translucent.diffusion.walls import Walls
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient

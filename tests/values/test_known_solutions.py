@@ -10,11 +10,12 @@ from scipy import sparse
 
 import translucent as tl
 from translucent.diffusion import field
+from translucent.diffusion.cell_system import MOST, TOLERANCE, KnownSolutions
 from translucent.diffusion.entering_rays import EnteringRays
 from translucent.diffusion.field import DiffusingBody
 from translucent.diffusion.grid import body_grid
 from translucent.diffusion.lit_body import lit_body
-from translucent.diffusion.solution import MOST, TOLERANCE, BodySystem, KnownSolutions
+from translucent.diffusion.solution import BodySystem
 from translucent.diffusion.volume import DiffusingVolume, VolumeGrid
 from translucent.geometry.solids import Sphere
 from translucent.planning.scattering import Diffusion

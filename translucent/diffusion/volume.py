@@ -24,12 +24,12 @@ import numpy.typing as npt
 from scipy.ndimage import distance_transform_edt, map_coordinates
 
 from translucent.arrays import Array, Integers
+from translucent.diffusion.cell_system import CellSystem
 from translucent.diffusion.densities import cell_means
 from translucent.diffusion.entering import DIRECTIONS, environment_parts, even_directions, nearest_parts, path_inside
 from translucent.diffusion.environment_ahead import EnvironmentAhead, environment_ahead
 from translucent.diffusion.grid import BodyGrid, body_grid
 from translucent.diffusion.photons import FineCells
-from translucent.diffusion.solution import CellSystem
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffusion_coefficient
 from translucent.formulas.light import cone_attenuation
