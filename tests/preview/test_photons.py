@@ -13,6 +13,7 @@ from PIL import Image
 import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent.geometry.solids import Box, Sphere
+from translucent.gpu.passes import caustics as caustics_pass
 from translucent.gpu.refinement import PhotonPicture
 from translucent.gpu.viewport import Viewport
 from translucent.planning import caustics
@@ -40,6 +41,13 @@ def view() -> Iterator[ViewportRenderer]:
     made.close()
 
 
+@pytest.fixture
+def points(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Photons are points: their squares are the smaller the more have been followed with them."""
+    monkeypatch.setattr(caustics_pass, "neighbors", lambda count: (3, 6, np.inf))
+
+
+@pytest.mark.usefixtures("points")
 def test_rounds_add_up_to_the_photons_of_one_frame(view: ViewportRenderer) -> None:
     """They are the same photons, so that energy is right whatever their number; and the picture is drawn in parts."""
     plan = view.renderer.plan(LIT, caustics=tl.Caustics(ROUND))
@@ -78,6 +86,7 @@ def test_rounds_add_up_to_the_photons_of_one_frame(view: ViewportRenderer) -> No
     assert errors[2] == pytest.approx(truth, rel=1e-6)
 
 
+@pytest.mark.usefixtures("points")
 def test_photons_light_the_still_picture_until_something_changes(
     view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import moderngl
@@ -33,8 +34,9 @@ from translucent.scene.scene import Scene
 _LANDED = ("landed_point", "landed_power", "landed_normal")
 _RECEIVED = ("photon_irradiance", "opaque_axial_depth", "receiver_normal")
 
-#: Photons of a pixel from which on they stay in it; fewer are spread. Of polished glass errors of pictures are larger
-#: with 2 and 8; rough interfaces blur caustics, and errors are smaller by a tenth to a half with four times as many.
+#: Photons of a pixel from which on they stay in it; fewer are spread. Each is a square that holds as many as the first
+#: number, up to half a pixel wide. Of polished glass errors of pictures are larger with 8, and the same with 2;
+#: rough interfaces blur caustics, and errors are smaller by a tenth to a half with four times as many.
 ENOUGH, ENOUGH_OF_ROUGH = 4.0, 32.0
 
 #: Samples with photons, in frames of so many samples at least: drawing what they land on takes a fifth of a sample's
@@ -43,6 +45,9 @@ ROUNDS, ROUNDS_FROM = range(4, 8), 8
 
 #: Photons that are followed together: 48 bytes each are kept of them.
 BATCH = PHOTON_WIDTH * 512
+
+#: What `start_of` of ``shaders/transport/photon_step.glsl`` adds for each photon to its start in the unit square.
+_STEP = np.array([3242174889, 2447445414]) / 2.0**32
 
 #: Bytes that are kept of a photon, by the names of the buffers.
 _BYTES = {"photons": 72, "live_photons": 12, "photon_segments": 24}
@@ -54,12 +59,16 @@ _ONE_PLACE = 2e-4
 
 @dataclass(frozen=True, eq=False)
 class PhotonTracer:
-    """Everything for following the photons of a scene: aims, target for the hits of a batch, programs and textures."""
+    """Everything for following the photons of a scene: aims, target for the hits of a batch, programs and textures.
+
+    `channels`: 3 if each photon carries one of three channels, else 1.
+    """
 
     aims: list[PhotonAim]
     landed: moderngl.Framebuffer
     programs: Sequence[Any]
     textures: dict[str, moderngl.Texture]
+    channels: int
 
 
 class CausticsPass:
@@ -104,7 +113,8 @@ class CausticsPass:
         if not again:
             job.targets["photons"].clear()
         aims = photon_aims(job.scene, media_center(job.scene), job.plan.caustics.photons)
-        return PhotonTracer(aims, self._landed(stack), *self._tracer(stack, job))
+        channels = 3 if _disperses(job.scene) else 1
+        return PhotonTracer(aims, self._landed(stack), *self._tracer(stack, job), channels)
 
     def follow(self, job: FrameJob, tracer: PhotonTracer, number: int, begin: int, end: int) -> None:
         """Follow some photons of one aim, and add them to the pixels of the opaque points that they land on."""
@@ -118,6 +128,9 @@ class CausticsPass:
                 self._streams.follow(job, tracer.programs, tracer.landed, count)
             else:
                 self._follow(tracer.programs[0], tracer.landed, count)
+            first_one, other, area = neighbors(count)
+            apart = ENOUGH * tracer.channels / (area * max(tracer.aims[number].photons, end))
+            set_used(self._splat.program(), {"beside": (first_one, other), "footprint": apart})
             self._add(job, tracer.landed, count)
 
     def _landed(self, stack: ExitStack) -> moderngl.Framebuffer:
@@ -146,7 +159,7 @@ class CausticsPass:
             "FROM_EYE": False,
             "LIGHTS": False,
             "ROUGH": any(surface.roughness > 0 for surface in surfaces),
-            "DISPERSION": any(surface.dispersion > 0 for surface in surfaces),
+            "DISPERSION": _disperses(scene),
             **coat_switches(scene.bodies),
         }
         by_embree = job.plan.hits == "embree"
@@ -170,8 +183,9 @@ class CausticsPass:
         landed_on = dict(zip(_LANDED, landed.color_attachments, strict=True))
         self._splat.bind(**landed_on, opaque_axial_depth=job.targets["opaque"].color_attachments[0])
         job.targets["photons"].use()
-        add_up(self._gl)
-        self._splat.draw_points(program, 4 * count)  # the pixels that it touches
+        set_uniform(program, "landed_count", count)
+        add_up(self._gl, moderngl.PROGRAM_POINT_SIZE)
+        self._splat.draw_points(program, count)
 
     def draw_depth(self, job: FrameJob, objects: tuple[int, ...]) -> None:
         """Draw the depth of opaque objects."""
@@ -232,6 +246,33 @@ class CausticsPass:
         job.targets.view("opaque", 1).use()
         add_up(self._gl)
         self._known.draw_fullscreen(program)
+
+
+def _disperses(scene: Scene) -> bool:
+    return any(body.surface is not None and body.surface.dispersion > 0 for body in scene.bodies)
+
+
+@lru_cache(maxsize=16)
+def neighbors(count: int) -> tuple[int, int, float]:
+    """Photons of a batch that start side by side: what their numbers differ by, in two directions, and by which area.
+
+    Starts are a lattice: any photon has these neighbors where the batch has their numbers. They are the nearest ones
+    among those whose numbers differ by at most a quarter of the batch, and by multiples of 3: these carry the same
+    channel of light.
+
+    Returns
+    -------
+    one, other : int
+    area : float
+        Of the parallelogram of the steps to both, as a fraction of the area in which photons start.
+    """
+    numbers = np.arange(3, max(count // 4, 30) + 1, 3)
+    steps = (numbers[:, None] * _STEP + 0.5) % 1.0 - 0.5
+    length = np.hypot(*steps.T)
+    one = int(length.argmin())
+    areas = np.abs(steps[one, 0] * steps[:, 1] - steps[one, 1] * steps[:, 0])
+    other = int(np.where(areas > 0.5 * length[one] * length, length, np.inf).argmin())
+    return int(numbers[one]), int(numbers[other]), float(areas[other])
 
 
 def _rounds(samples: int) -> range:
