@@ -1,4 +1,4 @@
-"""Exceptions of the toolkit: what was asked, what was found and what to do; suggestions of known names."""
+"""Exceptions of the toolkit, whose messages name the request, the finding and a remedy; suggestions of known names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The thirty scenes of the benchmark: what each tests, what a renderer needs for it, and how it is made."""
+"""The thirty scenes of the benchmark, each with its subject and the features that a renderer needs for it."""
 
 from __future__ import annotations
 

@@ -631,7 +631,7 @@ def _placed(item: Object) -> tuple[Array, npt.NDArray[np.int32]]:
 def body_grid(body: Object, step: float, opaque: Sequence[Object] = ()) -> BodyGrid:
     """Grid of a closed body with cells of this side in metres, less closed opaque objects that are inside it."""
     matrix = body.matrix[:3, :3]
-    corners = body.mesh.vertices @ matrix.T + body.matrix[:3, 3]
+    corners = body.world_vertices
     faces = np.asarray(body.mesh.faces)
     if np.linalg.det(matrix) < 0.0:
         faces = faces[:, ::-1]

@@ -1,4 +1,4 @@
-"""Plans for pages: what WebGL2 can draw of a scene, and notes of what it leaves out."""
+"""Plans for pages: passes that WebGL2 can draw, and notes on effects that pages leave out."""
 
 from __future__ import annotations
 

@@ -149,7 +149,7 @@ class PhotonPaths(InterfacePaths):
 def _emitted(scene: Scene, light: Light, photons: int, rng: np.random.Generator) -> tuple[Rays, Array]:
     """Rays of a light's photons towards the ball around all bodies, and their power (k, 3)."""
     some = np.arange(photons)
-    points = np.concatenate([body.mesh.vertices @ body.matrix[:3, :3].T + body.matrix[:3, 3] for body in scene.bodies])
+    points = np.concatenate([body.world_vertices for body in scene.bodies])
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     radius = float(np.linalg.norm(points - middle, axis=1).max()) * (1.0 + 1e-9)
     middle = middle - scene.camera.eye

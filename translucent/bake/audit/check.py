@@ -245,7 +245,7 @@ def fix_materials(
 
 
 def _hidden(before: MaterialFinding, baked: ThicknessMap) -> Iterator[MaterialFinding]:
-    """Finding about a body most of whose faces have no texels of their own in the baked map."""
+    """Finding about a body if most of its faces have no texels of their own in the baked map."""
     faces = len(baked.mesh.faces)
     fraction = baked.report.faces_without_texel / faces
     if fraction < MOST_HIDDEN or baked.values.size < ENOUGH_TEXELS * faces:
