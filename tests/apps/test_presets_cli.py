@@ -201,6 +201,11 @@ def test_json_has_no_swatches(run: Run, pretend_a_terminal: Callable[..., None])
         (["show", "unobtainium"], "error: preset 'unobtainium'; no preset has this name; use one of marble"),
         (["show"], "error: Missing argument 'NAME'"),
         (["shw", "merlot"], "error: No such command 'shw'"),
+        (
+            ["wine"],
+            "error: No such command 'wine'; 'translucent presets show red_wine' prints red_wine, 'translucent presets "
+            "--search wine' lists red_wine, ",
+        ),
         (["--jsn"], "error: No such option"),
     ],
 )

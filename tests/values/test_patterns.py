@@ -1,6 +1,8 @@
-"""Patterns: veins of marble, bubbles of air in ice."""
+"""Patterns: veins of marble, bubbles of air in ice, blotches of skin."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from translucent.media.preset import preset_text, read_presets
 from translucent.scene.patterns import ACROSS, PATTERNS, patterned
 from translucent.scene.showcase import with_pattern
 
+OF = {"veins": "marble", "bubbles": "ice", "blotches": "skin"}
 BOX = Box((0, 0, 0), (0.1, 0.2, 0.3)).tessellate()
 
 
@@ -21,10 +24,12 @@ def test_a_pattern_has_a_size_in_metres_and_goes_through_the_body(name: str) -> 
     assert mesh.uv is not None
     assert surface is not None
     np.testing.assert_array_equal(mesh.vertices[: len(BOX.vertices)], BOX.vertices)
-    np.testing.assert_allclose(PATTERNS[name].period * mesh.uv, mesh.vertices @ ACROSS.T, rtol=1e-12)
+    linear = np.allclose(PATTERNS[name].period * mesh.uv, mesh.vertices @ ACROSS.T, rtol=1e-12, atol=0.0)
+    assert linear == PATTERNS[name].grain
     assert patterned(BOX, None, name)[0] is mesh  # what renderers keep of it stays
-    scaled = tl.Object(BOX, transform=np.diag([2.0, 2.0, 2.0, 1.0]), material="marble" if name == "veins" else "ice")
-    np.testing.assert_allclose(scaled.mesh.uv, 2.0 * mesh.uv, rtol=1e-12)
+    scaled = tl.Object(BOX, transform=np.diag([2.0, 2.0, 2.0, 1.0]), material=OF[name])
+    again = patterned(replace(BOX, vertices=2.0 * BOX.vertices), None, name)[0]
+    np.testing.assert_allclose(scaled.mesh.uv, again.uv, rtol=1e-12)
     # It repeats without a seam: texels across the edge differ as neighbors do.
     for texture in filter(None, surface.textures):
         edge = np.abs(texture.pixels[0] - texture.pixels[-1]).mean()
@@ -35,7 +40,7 @@ def test_textures_of_a_surface_stay() -> None:
     own = tl.Surface(color_texture=tl.Texture(np.ones((1, 1, 3))))
     assert patterned(BOX, own, "veins") == (BOX, own)
     assert patterned(BOX, None, "") == (BOX, None)
-    with pytest.raises(InputError, match=r"no pattern has the name 'wood'; use one of veins, bubbles"):
+    with pytest.raises(InputError, match=r"no pattern has the name 'wood'; use one of veins, bubbles, blotches"):
         patterned(BOX, None, "wood")
 
 
@@ -47,7 +52,7 @@ def test_scenes_and_presets_have_patterns() -> None:
     assert opaque is scene.objects[1]
     ice = tl.preset("ice")
     assert read_presets(preset_text(ice))["ice"].pattern == ice.summary()["pattern"] == "bubbles"
-    with pytest.raises(InputError, match=r'"veins" or "bubbles"'):
+    with pytest.raises(InputError, match=r'"veins" or "bubbles" or "blotches"'):
         read_presets(preset_text(ice).replace('"bubbles"', '"wood"'))
 
 

@@ -14,6 +14,7 @@ import translucent as tl
 from translucent.formulas.color import to_hex
 from translucent.formulas.diffuse_interface import diffuse_interface, half_space_reflectance
 from translucent.formulas.phase import HenyeyGreenstein
+from translucent.geometry.solids import Sphere
 from translucent.media.preset import PAPERS, Preset
 
 NAMES = sorted(tl.presets())
@@ -149,11 +150,17 @@ def test_estimated_presets_have_their_colors_at_their_distances() -> None:
         assert found.reduced == found.medium.scatters == (name in SCATTERING), name
 
 
-def test_skin_is_the_measured_one_with_a_surface() -> None:
+def test_skin_scatters_as_the_measured_one_and_has_the_color_of_light_skin() -> None:
     found, measured = tl.preset("skin"), tl.preset("skin2")
-    np.testing.assert_array_equal(found.absorption, measured.absorption)
     np.testing.assert_array_equal(found.scattering, measured.scattering)
     assert (found.medium.ior, found.roughness) == (1.4, 0.45)
+    body = tl.Object(Sphere((0, 0, 0), 0.1).tessellate(8), material="skin")
+    assert body.surface is not None
+    assert body.surface.color_texture is not None
+    blotches = body.surface.color_texture.pixels.reshape(-1, 3)
+    # sRGB (194, 150, 130) of the color chart of McCamy, Marcus and Davidson 1976
+    np.testing.assert_allclose(found.diffuse_reflectance * blotches.mean(axis=0), (0.539, 0.305, 0.223), rtol=0.02)
+    assert 0.04 < (blotches.std(axis=0) / blotches.mean(axis=0))[1] < 0.1
 
 
 def test_recipes_of_marble_and_gummy_are_these_with_another_surface_and_with_haze() -> None:

@@ -17,10 +17,40 @@ from translucent.errors import InputError
 if TYPE_CHECKING:
     from translucent.media.preset import Preset
 
+#: Names of presets in a hint.
+MOST_NAMED = 3
+
 _LISTED = ("name", "kind", "group", "regime", "colors", "diffuse_color", "source")
 
 
-@click.group(invoke_without_command=True, epilog="Example: translucent presets --search wine")
+class _WordsAreSearched(click.Group):
+    """Group of commands whose message for an unknown command says which presets have this word."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        word = args[0]
+        if self.get_command(ctx, word) is None and word[:1].isalnum() and (hint := _search_hint(word)):
+            ctx.fail(f"No such command {word!r}; {hint}")
+        return super().resolve_command(ctx, args)
+
+
+def _search_hint(word: str) -> str:
+    """What to run for presets that have this word; empty if none has it."""
+    from translucent.media.presets import matching
+    from translucent.media.presets import presets as all_presets
+
+    found = list(matching(all_presets(), word))
+    if not found:
+        return ""
+    named, more = ", ".join(found[:MOST_NAMED]), len(found) - MOST_NAMED
+    every = f"{named} and {more} more" if more > 0 else named
+    return (
+        f"'translucent presets show {found[0]}' prints {found[0]}, 'translucent presets --search {word}' lists {every}"
+    )
+
+
+@click.group(cls=_WordsAreSearched, invoke_without_command=True, epilog="Example: translucent presets --search wine")
 @click.option(
     "--group",
     metavar="G",

@@ -29,7 +29,7 @@ from translucent.units import metres_per_unit, parse_length
 
 Kind = Literal["measured", "estimated"]
 Regime = Literal["absorbing", "single scattering", "scattering dominated"]
-PatternName = Literal["", "veins", "bubbles"]
+PatternName = Literal["", "veins", "bubbles", "blotches"]
 Triple = tuple[float, float, float]
 
 #: The papers that measured presets name as their source.
@@ -84,7 +84,7 @@ class Preset:
         Of a typical surface, 0 (polished) to 1, as in `Surface`; 0 also where nothing is said about it.
     group : str
         Heading under which it is listed, such as ``stone and resin``; empty if none.
-    pattern : {"", "veins", "bubbles"}
+    pattern : {"", "veins", "bubbles", "blotches"}
         Of a typical surface; see `translucent.scene.patterns`.
     """
 

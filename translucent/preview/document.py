@@ -134,7 +134,7 @@ class Material:
     color_texture, roughness_texture : str
         Files of pictures that multiply the tint of the surface (baseColorTexture) and its roughness
         (metallicRoughnessTexture, G), over the texture coordinates of the mesh; or nothing: those of the model.
-    pattern : {"", "veins", "bubbles"}
+    pattern : {"", "veins", "bubbles", "blotches"}
         On surfaces without textures; see `translucent.scene.patterns`.
     """
 
@@ -625,7 +625,7 @@ model.time = Time of the file's animations in seconds: nodes, skins and morph ta
     the moved meshes.
 material.color_texture = baseColorTexture (glTF): a picture (.png, .jpg) over the texture coordinates of the mesh, which
     tints what passes the surface.
-material.pattern = Pattern on surfaces without textures: veins of marble, or bubbles of air in ice.
+material.pattern = Pattern on surfaces without textures: veins of marble, bubbles of air in ice, or blotches of skin.
 material.roughness_texture = metallicRoughnessTexture (glTF): a picture, the green of which multiplies the roughness.
 placed.location = How far the object is moved, in metres. Or drag its gizmo (W).
 placed.rotation = Degrees about X, then Y, then Z, around its middle. Or drag its gizmo (R).

@@ -1,4 +1,4 @@
-"""Patterns of stone and ice: textures that need no texture coordinates of the mesh, and bubbles of air in ice.
+"""Patterns of stone, ice and skin: textures that need no texture coordinates of the mesh, and bubbles of air in ice.
 
 A texture is the same all along one oblique direction, as veins are sheets that cross a block. So its texture
 coordinates are linear in the position: they have no seams, and a mesh keeps its vertices. A texture has a size in
@@ -10,6 +10,9 @@ fractals", section 2.4). Veins are where such a field is 0 (after Perlin 1985, "
 Ice freezes from outside to inside, and pushes the air of the water before it. So its rim is clear, and its middle is
 full of bubbles. Many are long, along the direction of freezing. The slower water freezes, the larger they are: they
 grow with the body (Carte 1961, "Air bubbles in ice"). Here they are cavities of the mesh.
+
+Skin has more blood in some places than in others, and more melanin. Such blotches have no direction, as veins have. So
+the texture coordinates of skin swing along two more directions.
 """
 
 from __future__ import annotations
@@ -51,6 +54,16 @@ LARGE = 0.004
 #: Standard deviation of the slopes of melted ice along each of two directions.
 SLOPE = 0.06
 
+#: Change of the logarithm of skin's diffuse reflectance, red, green and blue: by 0.1 % more blood in it, three quarters
+#: of it oxygenated (absorption by Prahl 1999), and by melanin, a filter on top (wavelength ** -3.48, Jacques 1998).
+BLOOD = np.array([-0.037, -0.113, -0.060])
+MELANIN = np.array([-0.05, -0.072, -0.134])
+
+#: Coordinates of a pattern without a grain swing along these two directions, with this period in metres. The slope
+#: of a swing is below 1, the slope of the coordinates themselves.
+SWINGS = np.cross(*ACROSS) + np.array([[0.5], [-0.5]]) * ACROSS
+SWING_PERIOD, SWING_SLOPE = 0.13, 0.7
+
 
 @dataclass(frozen=True)
 class Pattern:
@@ -64,11 +77,14 @@ class Pattern:
         Gives a surface the textures of the pattern.
     bubbles : int
         Number of bubbles in a closed body.
+    grain : bool
+        Whether its textures are uniform along one direction.
     """
 
     period: float
     surfaced: Callable[[Surface], Surface]
     bubbles: int = 0
+    grain: bool = True
 
 
 def uniform_scale(transform: npt.ArrayLike) -> float:
@@ -101,15 +117,22 @@ def patterned(mesh: Mesh, surface: Surface | None, name: str, scale: float = 1.0
         found = f"no pattern has the name {name!r}"
         raise InputError(f"pattern of {mesh.name!r}", found, f"use one of {', '.join(PATTERNS)}")
     chosen = PATTERNS[name]
-    return _marked(mesh, scale / chosen.period, chosen.bubbles), chosen.surfaced(surface or Surface())
+    return _marked(mesh, scale, chosen), chosen.surfaced(surface or Surface())
 
 
 @lru_cache(maxsize=4)
-def _marked(mesh: Mesh, frequency: float, bubbles: int) -> Mesh:
+def _marked(mesh: Mesh, scale: float, pattern: Pattern) -> Mesh:
     """Mesh with texture coordinates and bubbles, cached so that what renderers keep of a mesh stays."""
-    if bubbles and mesh.diagnosis.solid:
-        mesh = _with_cavities(mesh, *_bubbles(mesh, bubbles))
-    return replace(mesh, uv=frequency * mesh.vertices @ ACROSS.T)
+    if pattern.bubbles and mesh.diagnosis.solid:
+        mesh = _with_cavities(mesh, *_bubbles(mesh, pattern.bubbles))
+    places = scale * mesh.vertices
+    across = places @ ACROSS.T
+    if not pattern.grain:
+        length = SWING_PERIOD / (2.0 * np.pi)
+        first, second = (places @ SWINGS.T / length).T
+        swings = np.stack([np.cos(first) + np.cos(second), np.sin(first) - np.sin(second)], axis=1)
+        across += SWING_SLOPE * length * swings
+    return replace(mesh, uv=across / pattern.period)
 
 
 def _with_cavities(mesh: Mesh, middles: Array, axes: Array) -> Mesh:
@@ -191,6 +214,20 @@ def _melted(surface: Surface) -> Surface:
     return replace(surface, normal_texture=_waves())
 
 
+def _blotched(surface: Surface) -> Surface:
+    return replace(surface, color_texture=_blood_and_melanin())
+
+
+@lru_cache(maxsize=1)
+def _blood_and_melanin() -> Texture:
+    """Blotches of blood, 7 mm to 13 cm wide, and smaller ones of melanin: factors of what passes the surface."""
+    random = np.random.default_rng(3)
+    wide, small, melanin = (_field(random, decay, least, 60.0) for decay, least in ((1.5, 3), (1.0, 15), (0.8, 10)))
+    blood = np.clip(1.2 + 0.4 * wide + 0.2 * small, 0.0, None)
+    melanin = np.clip(0.5 + 0.2 * melanin, 0.0, None)
+    return _texture(np.exp(blood[..., None] * BLOOD + melanin[..., None] * MELANIN))
+
+
 @lru_cache(maxsize=1)
 def _veins() -> Texture:
     """Gray veins, wide and faint ones around sharp ones, and clouds: factors of what passes the surface."""
@@ -212,11 +249,14 @@ def _waves() -> Texture:
     return _texture(0.5 + 0.5 * normals / np.linalg.norm(normals, axis=-1, keepdims=True))
 
 
-def _field(random: np.random.Generator, decay: float) -> Array:
-    """(n, n): periodic random field of mean 0 and variance 1, whose amplitudes fall as frequency ** -decay."""
+def _field(random: np.random.Generator, decay: float, least: float = 1.5, most: float = np.inf) -> Array:
+    """(n, n): periodic random field of mean 0 and variance 1, whose amplitudes fall as frequency ** -decay.
+
+    Only frequencies from `least` to `most` in a period are in it.
+    """
     across = np.fft.fftfreq(TEXELS, 1.0 / TEXELS)
     frequency = np.hypot(across[:, None], np.fft.rfftfreq(TEXELS, 1.0 / TEXELS))
-    amplitude = np.where(frequency > 1.0, np.maximum(frequency, 1.0) ** -decay, 0.0)
+    amplitude = np.where((frequency >= least) & (frequency <= most), np.maximum(frequency, 1.0) ** -decay, 0.0)
     field = np.fft.irfft2(amplitude * np.fft.rfft2(random.standard_normal((TEXELS, TEXELS))), (TEXELS, TEXELS))
     return np.asarray(field / field.std())
 
@@ -232,4 +272,8 @@ def _texture(values: Array) -> Texture:
 
 
 #: All patterns by name.
-PATTERNS = {"veins": Pattern(0.15, _veined), "bubbles": Pattern(0.06, _melted, 1200)}
+PATTERNS = {
+    "veins": Pattern(0.15, _veined),
+    "bubbles": Pattern(0.06, _melted, 1200),
+    "blotches": Pattern(0.4, _blotched, grain=False),
+}
