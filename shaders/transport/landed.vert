@@ -17,8 +17,8 @@ uniform sampler2D landed_power;
 uniform sampler2D landed_normal;       // of the face, unit, to the side on which it lies
 uniform sampler2D opaque_axial_depth;
 uniform int landed_count;
-uniform ivec2 beside;     // what numbers of photons differ by that start side by side, in two directions
-uniform float footprint;  // of a few photons, as a fraction of the parallelogram of these two
+uniform ivec2 beside;     // differences of number between photons that start side by side, in two directions
+uniform float footprint;  // area of a few photons, as a fraction of the parallelogram to these two neighbors
 
 flat out vec3 irradiance;
 flat out vec4 parts;        // of the photon: in its pixel, beside it, above or below, and aside of both
@@ -47,7 +47,7 @@ ivec2 place_of(int number) {
     return ivec2(uint(number) % PHOTON_WIDTH, uint(number) / PHOTON_WIDTH);
 }
 
-// To where the nearer one has landed of two that start on opposite sides of a photon; false where neither has.
+// Finds the offset to the nearer of two photons that start on opposite sides of a photon; false if neither has landed.
 bool to_neighbor(int number, vec3 point, int by, out vec3 nearest) {
     bool found = false;
     nearest = vec3(0.0);
@@ -62,7 +62,7 @@ bool to_neighbor(int number, vec3 point, int by, out vec3 nearest) {
     return found;
 }
 
-// Side of the square, in pixels, that a photon is. pixels: that a square metre of its plane takes in the picture.
+// Side of a photon's square in pixels. pixels: number of pixels that a square metre of its plane covers in the picture.
 float photon_width(int number, vec3 point, vec3 normal, float pixels) {
     vec3 one, other;
     if (!to_neighbor(number, point, beside.x, one) || !to_neighbor(number, point, beside.y, other)) { return WIDEST; }
