@@ -25,8 +25,10 @@ void main() {
             vec4 found = texelFetch(photon_irradiance, there, 0);
             if (found.a == 0.0) { continue; }
             vec2 spread = texelFetch(photon_spread, there, 0).rg;
-            if (float(max(abs(x), abs(y))) > spread.x) { continue; }
-            if ((x == 0 && y == 0) || same_surface(own, receiver_at(there))) { irradiance += found.rgb * spread.y; }
+            vec2 within = clamp(spread.x + 0.5 - abs(vec2(x, y)), 0.0, 1.0);
+            float share = within.x * within.y * spread.y;
+            if (share == 0.0) { continue; }
+            if ((x == 0 && y == 0) || same_surface(own, receiver_at(there))) { irradiance += share * found.rgb; }
         }
     }
     radiance = vec4(min(photon_weight * irradiance * texelFetch(receiver_base, here, 0).rgb / PI, vec3(NOTHING)), 0.0);

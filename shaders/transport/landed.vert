@@ -1,7 +1,7 @@
 // Photons as points of the picture, where it shows the surfaces on which they have landed. What each adds to the irradiance
 // of its pixels is its power, over the area that a pixel covers of the plane in which it lies.
 //
-// Each photon is a square that is as large as a few photons take where they land, up to half a pixel wide. Photons start on a
+// Each photon is a square that is as large as some photons take where they land, up to half a pixel wide. Photons start on a
 // lattice, and without a width they would show its moire in even light. In a focus they have almost no width. The area that a
 // photon takes there is its footprint (photon differentials, Schjoeth et al. 2007, "Photon differentials"; Frisvad et al. 2014,
 // "Photon differential splatting for rendering caustics"), here from differences to photons that start beside it. Of the two
@@ -18,7 +18,7 @@ uniform sampler2D landed_normal;       // of the face, unit, to the side on whic
 uniform sampler2D opaque_axial_depth;
 uniform int landed_count;
 uniform ivec2 beside;     // differences of number between photons that start side by side, in two directions
-uniform float footprint;  // area of a few photons, as a fraction of the parallelogram to these two neighbors
+uniform float footprint;  // area of some photons, as a fraction of the parallelogram to these two neighbors
 
 flat out vec3 irradiance;
 flat out vec4 parts;        // of the photon: in its pixel, beside it, above or below, and aside of both

@@ -48,7 +48,7 @@ FORMATS = {
     "base": Format((4, 4), with_depth=True),
     # RGBA32F irradiance of photons on the nearest opaque surface, and how many there are.
     "photons": Format((4,)),
-    # RG32F: how far the photons of a pixel are spread, and the fraction that each pixel gets.
+    # RG32F: how far the photons of a pixel are spread, and the fraction that each pixel within gets.
     "photon_spread": Format((2,)),
     # RGBA32F interface where a ray first enters a body: normal, axial depth, parameters, color; with a depth buffer.
     "entered": Format((4, 4, 4), with_depth=True),

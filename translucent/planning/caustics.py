@@ -35,10 +35,10 @@ class Caustics:
     Photons (Jensen 1996) leave the lights towards the bodies, and are refracted or reflected there by chance, as
     Fresnel says; media absorb along the path. Refracted or reflected photons land on the first opaque surface, and
     are drawn into the picture of the opaque objects (McGuire & Luebke 2009), each divided by the area that its pixel
-    covers there. They are as wide as they are apart there, up to half a pixel (Schjoeth et al. 2007, photon
-    differentials); where there are few, they are spread over some pixels. Surfaces reflect them diffusely. The
-    energy is right whatever their number; the noise of a pixel falls with its square root. Of several samples of a
-    pixel each follows its part of the photons.
+    covers there. Each is a square that takes the space of some photons there, up to half a pixel wide (photon
+    differentials, Schjoeth et al. 2007); where there are few, they are spread over some pixels. Surfaces
+    reflect them diffusely. The energy is right whatever their number; the noise of a pixel falls with its square root.
+    Of several samples of a pixel each follows its part of the photons.
 
     Others (`in_media`) are followed into bodies in which light diffuses, and light fog all along their paths.
 

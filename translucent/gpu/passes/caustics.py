@@ -34,10 +34,10 @@ from translucent.scene.scene import Scene
 _LANDED = ("landed_point", "landed_power", "landed_normal")
 _RECEIVED = ("photon_irradiance", "opaque_axial_depth", "receiver_normal")
 
-#: Photons of a pixel from which on they stay in it; fewer are spread. Each is a square that holds as many as the first
-#: number, up to half a pixel wide. Of polished glass errors of pictures are larger with 8, and the same with 2;
-#: rough interfaces blur caustics, and errors are smaller by a tenth to a half with four times as many.
-ENOUGH, ENOUGH_OF_ROUGH = 4.0, 32.0
+#: Photons of a pixel from which on they stay in it; fewer are spread. Each photon is a square that holds as many as the
+#: first number, up to half a pixel wide. Of polished glass errors of pictures are larger with 8, and with 32 as large;
+#: rough interfaces blur caustics, and errors are smaller by up to a third with four times as many.
+ENOUGH, ENOUGH_OF_ROUGH = 16.0, 64.0
 
 #: Samples with photons, in frames of so many samples at least: drawing what they land on takes a fifth of a sample's
 #: time. Of the Sobol points the second four lie in the four quarters of a pixel, and their mean in its middle.
