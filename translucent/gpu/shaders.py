@@ -19,6 +19,7 @@ from typing import Any, TypeAlias
 
 import moderngl
 
+from translucent.arguments import brief
 from translucent.assets import shader_path
 from translucent.errors import InputError, RenderError
 from translucent.gpu.constants import CONSTANTS
@@ -361,7 +362,13 @@ def _evaluated(node: ast.expr, defines: Mapping[str, int]) -> int:
 
 
 def parts_of(lines: Iterable[tuple[int, str]]) -> Iterator[ShaderPart]:
-    """Top-level declarations in order, without constants, which are written anew."""
+    """Top-level declarations in order, without constants, which are written anew.
+
+    Raises
+    ------
+    InputError
+        If the last declaration does not end: it would be lost.
+    """
     above: list[str] = []
     part: list[str] = []
     depth = 0
@@ -385,6 +392,9 @@ def parts_of(lines: Iterable[tuple[int, str]]) -> Iterator[ShaderPart]:
             text = "\n".join(part)
             yield ShaderPart(file, "\n".join([*above, text]), _COMMENT.sub("", text) if "//" in text else text)
             above, part = [], []
+    if part:
+        found = f"a declaration that begins with {brief(part[0].strip())} does not end"
+        raise InputError("shader code", found, "close its braces and parentheses")
     if above:
         yield ShaderPart(last, "\n".join(above), "")
 
@@ -430,7 +440,8 @@ def used_constants(used: Collection[str]) -> list[str]:
 def used_code(name: str, gathered: Gathered, source: ShaderSource, defines: Mapping[str, int]) -> str:
     """Text of a shader with nothing that its switches leave out or that it does not use: compilers read all they get.
 
-    That is half of the time in which Mesa's makes a program. A shader that refuses the switches stays whole.
+    That is half of the time in which Mesa's makes a program. A shader that refuses the switches, or has a declaration
+    without an end, stays whole.
     """
     try:
         by_file = groupby(decided_lines(name, gathered, defines, set()), itemgetter(0))
