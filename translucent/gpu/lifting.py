@@ -69,7 +69,7 @@ def _head(name: str, code: str, dialect: Dialect) -> tuple[int, list[str]]:
     return ES, [f"#version {ES} es", origin, *highp, *[define] * precise]
 
 
-#: Outputs of the vertex shaders of bodies, of the pass over pixels, and of pictures in windows, each by location.
+#: Outputs of the vertex shaders of bodies, of the pass over pixels, of windows and of photons, each by location.
 _OF_BODIES = (
     "axial",
     "world_normal",
@@ -77,7 +77,6 @@ _OF_BODIES = (
     "from_center",
     "surface_uv",
     "vertex_color",
-    "irradiance",
     "counting",
     "to_axial_depth",
     "medium_of_body",
@@ -101,7 +100,9 @@ _OF_PICTURES = (
     "corner_and_ahead",
 )
 _OF_WINDOWS = ("place",)
-VARYINGS = {name: place for names in (_OF_BODIES, _OF_PICTURES, _OF_WINDOWS) for place, name in enumerate(names)}
+_OF_PHOTONS = ("irradiance", "parts", "own_texel")
+_STAGES = (_OF_BODIES, _OF_PICTURES, _OF_WINDOWS, _OF_PHOTONS)
+VARYINGS = {name: place for names in _STAGES for place, name in enumerate(names)}
 
 #: Bindings of the loose uniforms of a stage, and of the first of its textures. Blocks are below.
 LOOSE = {"frag": 14, "vert": 15}
