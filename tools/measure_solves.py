@@ -56,7 +56,7 @@ def main() -> None:
         return timing
 
     with (
-        patch.object(cell_system, "cg", timed("solver", cell_system.cg)),
+        patch.object(cell_system, "conjugate_gradients", timed("solver", cell_system.conjugate_gradients)),
         patch.object(cell_system, "_balance", timed("matrix", cell_system._balance)),
     ):
         body = bear(1.0)

@@ -49,13 +49,13 @@ def test_sides_of_a_sheet_and_faces_of_a_box_keep_apart() -> None:
     grid = grid_of(Box((-1, -0.04, -1), (1, 0.04, 1)).tessellate(), 24)
     axis = np.abs(grid.face_normals).argmax(axis=1)
     value = 1.0 + axis + 3.0 * (grid.face_normals.sum(axis=1) > 0.0)
-    volume = SurfaceSides.of(grid).volume(value[:, None].astype(np.float32), np.zeros((grid.count, 1), np.float32))
+    (volume,) = SurfaceSides.of(grid).volumes([(value[:, None], 0.0)])
     read = read_sides(volume, (grid.points - grid.cells.low) / grid.cells.step, grid.face_normals)[:, 0]
     np.testing.assert_allclose(read, value, atol=0.2)
 
     grid = grid_of(Sphere().tessellate(48), 24)
     slope = (2.0 + grid.points @ (0.3, 0.5, -0.4))[:, None]
-    volume = SurfaceSides.of(grid).volume(slope.astype(np.float32), np.zeros((grid.count, 1), np.float32))
+    (volume,) = SurfaceSides.of(grid).volumes([(slope, 0.0)])
     read = read_sides(volume, (grid.points - grid.cells.low) / grid.cells.step, grid.normals)
     np.testing.assert_allclose(read, slope, atol=0.02)
 

@@ -61,8 +61,6 @@ class LateralShift:
 
     Attributes
     ----------
-    rays : slice
-        Of `joined_rays`.
     step : (s, s) csr_array
         Maps a flux at the samples to the flux one distance between samples further along the rays.
     level : (k,) float64
@@ -71,50 +69,40 @@ class LateralShift:
         Metres after which rays leave the body without an interface; else inf.
     """
 
-    rays: slice
     step: sparse.csr_array
     level: Array
     chord: Array
 
     @classmethod
-    def of(cls, grid: BodyGrid, ray: EnteringRays, rays: slice, ior: float) -> LateralShift:
+    def of(cls, grid: BodyGrid, ray: EnteringRays, ior: float) -> LateralShift:
         """Shift of the rays of one light."""
         spacing = np.sqrt(grid.area)
         along = _across(ray.directions, grid.face_normals[ray.samples])
         level = np.linalg.norm(along, axis=1)
         matched = ior == 1.0
         chord = grid.chords(ray.samples, ray.directions) if matched else np.full(len(level), np.inf)
-        return cls(rays, _step(grid, ray.samples, along), level / spacing, chord)
+        return cls(_step(grid, ray.samples, along), level / spacing, chord)
 
     def fractions(self, lengths: Array, weights: Array) -> Array:
         """(`MOST_SHIFTED` + 1, k): fractions shifted by each number of steps, of path lengths (q, k) in m."""
-        place = np.minimum(lengths * self.level, MOST_SHIFTED)
-        low = np.minimum(place.astype(np.int64), MOST_SHIFTED - 1)
-        found, ray = np.zeros((MOST_SHIFTED + 1, len(self.level))), np.arange(len(self.level))
-        for one, fraction, weight in zip(low, place - low, weights, strict=True):
-            found[one, ray] += weight * (1.0 - fraction)
-            found[one + 1, ray] += weight * fraction
-        return found
+        place = lengths * self.level
+        # Each length is shared between the two numbers around it: what goes on from each number to the next one.
+        onward = [(weights * np.clip(place - number, 0.0, 1.0)).sum(axis=0) for number in range(MOST_SHIFTED)]
+        return -np.diff([weights.sum(axis=0), *onward, np.zeros_like(self.level)], axis=0)
 
     def moved(self, values: Array, samples: Integers) -> Array:
         """(s, n): values (`MOST_SHIFTED` + 1, k, n) of rays at samples (k,), shifted by each number of steps."""
         total = np.zeros((self.step.shape[0], values.shape[2]))
-        for own in values[::-1]:
+        total[samples] = values[-1]
+        for own in values[-2::-1]:
             total = self.step @ total
             total[samples] += own
         return total
 
 
-def lateral_shifts(grid: BodyGrid, rays: Sequence[EnteringRays], ior: float) -> list[LateralShift]:
-    """Shifts of rays in the order of `joined_rays`, for those of one light each."""
-    ends = np.cumsum([0, *(len(ray.samples) for ray in rays)]).tolist()
-    parts = zip(rays, map(slice, ends[:-1], ends[1:]), strict=True)
-    return [LateralShift.of(grid, ray, part, ior) for ray, part in parts if ray.from_one and len(ray.samples)]
-
-
 def _across(directions: Array, normals: Array) -> Array:
     """(k, 3): parts of directions (k, 3) along the surface with normals (k, 3)."""
-    return np.asarray(directions - (directions * normals).sum(axis=1, keepdims=True) * normals)
+    return np.asarray(directions - np.einsum("ki,ki->k", directions, normals)[:, None] * normals)
 
 
 def _step(grid: BodyGrid, samples: Integers, along: Array) -> sparse.csr_array:
@@ -125,8 +113,11 @@ def _step(grid: BodyGrid, samples: Integers, along: Array) -> sparse.csr_array:
     """
     count, spacing = len(grid.points), float(np.sqrt(grid.area))
     reach = (MOST_SHIFTED + 1) * spacing
-    far, nearest = cKDTree(grid.points[samples]).query(grid.points, distance_upper_bound=reach)
-    receivers = np.flatnonzero(np.isfinite(far))
+    nearest = np.full(count, len(samples))
+    nearest[samples] = np.arange(len(samples))
+    others = np.flatnonzero(nearest == len(samples))
+    nearest[others] = cKDTree(grid.points[samples]).query(grid.points[others], distance_upper_bound=reach)[1]
+    receivers = np.flatnonzero(nearest < len(samples))
     normals, travel = grid.face_normals[receivers], np.zeros((count, 3))
     towards = _across(along[nearest[receivers]], normals)
     towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), np.finfo(np.float64).tiny)
@@ -134,7 +125,7 @@ def _step(grid: BodyGrid, samples: Integers, along: Array) -> sparse.csr_array:
     around = min(INTERPOLATED, count)
     apart, found = grid.tree.query(grid.points[receivers] - spacing * towards, around)
     apart, found = apart.reshape(-1, around), found.reshape(-1, around)
-    facing = (grid.face_normals[found] * normals[:, None]).sum(axis=2) > 0.0
+    facing = np.einsum("rni,ri->rn", grid.face_normals[found], normals) > 0.0
     weight = facing / (apart**2 + (0.1 * spacing) ** 2)
     spread = np.clip(1.0 + spacing * grid.divergence(travel)[receivers], LEAST_SPREAD, MOST_SPREAD)
     weight /= np.maximum(weight.sum(axis=1) * spread, np.finfo(np.float64).tiny)[:, None]

@@ -390,15 +390,17 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
     albedo = np.where(total > 0.0, reduced / np.where(total > 0.0, total, 1.0), 0.0)
     interface, polished = diffuse_interface(medium.ior, roughness), diffuse_interface(medium.ior)
     scattered = np.maximum(found.scattered, LEAST_SCATTERED)
-    uniform, ones = np.full((grid.count, 1), UNIFORM_COSINE), np.ones_like(found.inside)
-    parts = [found.fluence, albedo * found.entering, found.cosine[:, None], scattered]
-    below = [found.inside, np.zeros_like(found.inside), uniform, ones]
     directed = medium.ior == 1.0 and abs(medium.anisotropy) >= DIRECTED
-    if directed:
-        # Of signs of their own, and no part of a grid is negative.
-        parts, below = [*parts, 1.0 + found.travel], [*below, ones]
-    values, deep = np.concatenate(parts, axis=1), np.concatenate(below, axis=1)
-    volume = lit.shape.sides.volume(values.astype(np.float32), deep.astype(np.float32))
+    parts: list[tuple[Array, Array | float]] = [
+        (found.fluence, found.inside),
+        (albedo * found.entering, 0.0),
+        (found.cosine[:, None], UNIFORM_COSINE),
+        (scattered, 1.0),
+    ]
+    # Of signs of their own, and no part of a grid is negative.
+    parts += [(1.0 + found.travel, 1.0)] if directed else []
+    fluence, entering, cosine, on_paths, *travel = lit.shape.sides.volumes(parts)
+    on_paths[on_paths == 0.0] = 1.0
     inclusions = None if grid.inclusions is None else lit.shape.on_inclusions(found.at_inclusions)
     # Light leaves as through a polished interface, and more of it through a rough one.
     cosines, weights = exit_quadrature(medium.ior)
@@ -406,12 +408,12 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
     # Of diffuse light, four times the volume over the area.
     chord = 2.0 * lit.casters.body.mean_thickness * float(np.average(lit.shape.densities.cells, weights=grid.volumes))
     return DiffusionField(
-        fluence=np.ascontiguousarray(volume[..., :3]),
-        entering=np.ascontiguousarray(volume[..., 3:6]),
-        cosine=np.ascontiguousarray(volume[..., 6:7]),
+        fluence=fluence,
+        entering=entering,
+        cosine=cosine,
         inclusions=inclusions,
-        travel=np.ascontiguousarray(volume[..., 10:13]) if directed else None,
-        scattered=np.where(volume[..., 7:10] > 0.0, volume[..., 7:10], np.float32(1.0)),
+        travel=travel[0] if directed else None,
+        scattered=on_paths,
         low=lit.pose.outwards(grid.cells.low) + lit.pose.shift,
         turn=lit.pose.turn,
         step=grid.cells.step,
@@ -459,8 +461,8 @@ def lit_by_each_other(
     for i, more in last.items():
         total[i] = total[i].plus(more)
     second = received(last)
-    before = max(sum(float(np.vdot(flux, flux)) for flux in first.values()), np.finfo(np.float64).tiny)
-    again = min(sum(float(np.vdot(flux, first[i])) for i, flux in second.items() if i in first) / before, MOST_AGAIN)
+    before = max(sum(float((flux**2).sum()) for flux in first.values()), np.finfo(np.float64).tiny)
+    again = min(sum(float((flux * first[i]).sum()) for i, flux in second.items() if i in first) / before, MOST_AGAIN)
     for i, more in answers({i: flux / (1.0 - again) for i, flux in second.items()}).items():
         total[i] = total[i].plus(more)
     return total

@@ -8,7 +8,7 @@ enters at a slant.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -295,7 +295,7 @@ class Events:
         flux = grid.areas[samples] * flux
         if above is None:
             above = np.asarray(np.bincount(samples, self.above * flux, len(grid.points)), np.float64)
-        total = np.asarray(grid.below[0].T @ above)
+        total = np.asarray(grid.spreading @ above)
         for cell, weight in self.below:
             total += np.bincount(cell, weight * flux, grid.count)
         return total
@@ -322,6 +322,11 @@ class ShiftedEvents:
     travel: Array
     near: Array
     above: Array
+
+    def plus(self, more: ShiftedEvents) -> ShiftedEvents:
+        """Events of the rays of both."""
+        names = ("flux", "inverse", "travel", "near", "above")
+        return ShiftedEvents(*(getattr(self, name) + getattr(more, name) for name in names))
 
 
 class FirstEvents:
@@ -401,28 +406,23 @@ class FirstEvents:
         reached = optics.transmittance(np.where(np.isfinite(paths.limit), extinction * paths.limit, np.inf))
         return Events(self._albedo * near / self._d - excess, self._albedo * above, deep, reached, counted, slab)
 
-    def shifted(
-        self, paths: EntryPaths, events: Events, entering: Array, shifts: Sequence[LateralShift]
-    ) -> ShiftedEvents:
-        """First events of rays that enter with a flux (k,), shifted along the surface."""
+    def shifted(self, paths: EntryPaths, events: Events, entering: Array, shift: LateralShift | None) -> ShiftedEvents:
+        """First events of rays that enter with a flux (k,), shifted along the surface if they come from one light."""
         grid, layer, samples = self._grid, self._layer, paths.samples
         cosine = np.broadcast_to(np.asarray(paths.cosine), samples.shape)
         # Where the medium is denser events are nearer.
         metres = np.where(layer.depth > 0.0, grid.below[1] / np.where(layer.depth > 0.0, layer.depth, 1.0), 0.0)
         columns = [np.ones(len(samples)), 1.0 / (0.5 + cosine), *paths.directions.T, events.near, events.above]
         values = entering[:, None] * np.stack(columns, axis=1)
-        unshifted, total = np.ones(len(samples), bool), np.zeros((len(grid.points), len(columns)))
-        for shift in shifts:
-            unshifted[shift.rays] = False
-            own = samples[shift.rays]
-            parts = self._fractions(shift, own, cosine[shift.rays], metres[own])
-            fractions = np.stack([parts[0]] * 5 + [*parts[1:]], axis=2)
-            total += shift.moved(fractions * values[shift.rays], own)
-        if unshifted.any():
-            own = samples[unshifted]
-            total += np.stack([np.bincount(own, part, len(total)) for part in values[unshifted].T], axis=1)
-        near = grid.smoothed(total[:, 5], float(np.mean(layer.lateral_variance * metres**2)))
-        return ShiftedEvents(total[:, 0], total[:, 1], total[:, 2:5], near, grid.areas * total[:, 6])
+        if shift is None:
+            total = np.zeros((len(grid.points), len(columns)))
+            for of, part in zip(total.T, values.T, strict=True):
+                of[:] = np.bincount(samples, part, len(total))
+        else:
+            every, near, above = self._fractions(shift, samples, cosine, metres[samples])
+            total = shift.moved(np.stack([every] * 5 + [near, above], axis=2) * values, samples)
+        smooth = grid.smoothed(total[:, 5], float(np.mean(layer.lateral_variance * metres**2)))
+        return ShiftedEvents(total[:, 0], total[:, 1], total[:, 2:5], smooth, grid.areas * total[:, 6])
 
     def _fractions(
         self, shift: LateralShift, samples: Integers, cosine: Array, metres: Array

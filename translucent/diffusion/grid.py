@@ -263,6 +263,11 @@ class BodyGrid:
         return self._reading[:2]
 
     @cached_property
+    def spreading(self) -> sparse.csc_array:
+        """(cells, s): transposed interpolation of `below`: a power at each sample, for the cells that are read."""
+        return sparse.csc_array(self.below[0].T)
+
+    @cached_property
     def spread(self) -> Array:
         """(s,): metres by which the flux to each sample comes from less deep than where the fluence is read.
 
@@ -295,16 +300,21 @@ class BodyGrid:
         return alike.astype(np.float64), alike[..., None] * (self.points[self.nearest] - self.points[:, None])
 
     @cached_property
-    def _divergence(self) -> Array:
-        """(s, n, 3): factors by which differences of a vector field to the samples of `nearest` give its divergence."""
+    def _divergence(self) -> sparse.csr_array:
+        """(s, 3 s): divergence of a vector field from its values at the samples, by differences to `nearest`."""
         normal, (_, offset) = self.normals, self._alike
         along = normal[:, :, None] * normal[:, None, :]
         spread = np.einsum("sni,snj->sij", offset, offset) + self.area * (along + STIFF * np.eye(3))
-        return np.asarray(offset @ np.linalg.inv(spread) @ (np.eye(3) - along))
+        factors = offset @ np.linalg.inv(spread) @ (np.eye(3) - along)
+        own = np.arange(len(normal))[:, None]
+        factors = np.concatenate([factors, -factors.sum(axis=1, keepdims=True)], axis=1)
+        of = 3 * np.concatenate([self.nearest, own], axis=1)[:, :, None] + np.arange(3)
+        starts = np.arange(len(own) + 1) * of[0].size
+        return sparse.csr_array((factors.ravel(), of.ravel(), starts), (len(own), 3 * len(own)))
 
     def divergence(self, vectors: Array) -> Array:
         """(s,): divergence along the surface of vectors (s, 3) at the samples, by least squares over neighbors."""
-        return np.asarray(np.einsum("snc,snc->s", self._divergence, vectors[self.nearest] - vectors[:, None]))
+        return np.asarray(self._divergence @ vectors.ravel())
 
     @cached_property
     def curvature(self) -> Array:

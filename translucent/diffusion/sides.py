@@ -9,6 +9,7 @@ Salkauskas 1981): interpolated between cells it follows them, without steps at t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
@@ -85,12 +86,20 @@ class SurfaceSides:
         weights = sparse.csr_array((weight, samples, first), (len(used), len(points)))
         return cls(weights, side * int(np.prod(shape)) + cells[cell], deep, number[deep], shape)
 
-    def volume(self, values: Floats, deep: Floats) -> Floats:
-        """(6, x, y, z, n) float32: values (s, n) of the samples, interpolated, and `deep` (cells, n) farther inside."""
-        found = np.zeros((SIDES, int(np.prod(self.shape)), values.shape[1]), np.float32)
-        found[:, self.deep] = deep[self.numbers]
-        found.reshape(-1, values.shape[1])[self.places] = np.maximum(self.weights @ values, 0.0)
-        return found.reshape(SIDES, *self.shape, -1)
+    def volumes(self, parts: Sequence[tuple[Array, Array | float]]) -> list[Floats]:
+        """(6, x, y, z, n) float32 of each part: values (s, n) of the samples, interpolated, and farther inside others.
+
+        Those are (cells, n), or the same everywhere.
+        """
+        values = np.concatenate([own for own, _ in parts], axis=1).astype(np.float32)
+        near = np.maximum(self.weights @ values, 0.0)
+        ends, found = np.cumsum([own.shape[1] for own, _ in parts]), []
+        for own, (_, deep) in zip(np.split(near, ends[:-1], axis=1), parts, strict=True):
+            volume = np.zeros((SIDES, int(np.prod(self.shape)), own.shape[1]), np.float32)
+            volume[:, self.deep] = deep[self.numbers] if isinstance(deep, np.ndarray) else deep
+            volume.reshape(-1, own.shape[1])[self.places] = own
+            found.append(volume.reshape(SIDES, *self.shape, -1))
+        return found
 
 
 def _cells_near(grid: BodyGrid) -> Integers:

@@ -13,9 +13,10 @@ optimization"; Haskell et al. 1994 for the condition at the surface; Grosjean 19
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
 from typing import Protocol
 
 import numpy as np
@@ -24,7 +25,7 @@ from scipy import sparse
 from translucent.arrays import Array, Integers
 from translucent.diffusion.cell_system import TOLERANCE, CellSystem
 from translucent.diffusion.densities import Densities, even_densities
-from translucent.diffusion.entering_rays import EnteringRays, LateralShift, joined_rays, lateral_shifts
+from translucent.diffusion.entering_rays import EnteringRays, LateralShift
 from translucent.diffusion.first_events import (
     EntryPaths,
     FirstEvents,
@@ -37,12 +38,16 @@ from translucent.diffusion.first_events import (
 )
 from translucent.diffusion.grid import BodyGrid
 from translucent.diffusion.interfaces import scattered_escape
+from translucent.diffusion.keys import kept
 from translucent.diffusion.walls import SlabSolution, Walls
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient, half_space_reflectance
 from translucent.formulas.diffusion import UNIFORM_COSINE
 from translucent.formulas.phase import ISOTROPIC, PhaseFunction
 from translucent.media.medium import Medium
+
+#: Sets of rays, of a light or of the environment, whose effects are kept: at most, and numbers in all of them together.
+KEPT_RAYS, KEPT_NUMBERS = 8, 1 << 23
 
 #: Relative residual of the solver for factors that are near 1.
 ROUGH = 1e-3
@@ -172,6 +177,7 @@ class BodySystem:
         warm_starts: bool = False,
     ) -> None:
         self._warm_starts, self._ior = warm_starts, medium.ior
+        self._arriving: OrderedDict[Hashable, dict[int, _DirectionalEffects]] = OrderedDict()
         self._emitted = 4.0 * np.pi * np.asarray(medium.emission)
         reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
         self._grid, self._dense = grid, dense or even_densities(grid)
@@ -232,13 +238,16 @@ class BodySystem:
         scattered, leaving, passing = np.ones_like(entering), np.zeros_like(entering), np.zeros_like(entering)
         count = 0 if self._grid.inclusions is None else len(self._grid.inclusions.points)
         inclusions = np.zeros((count, 3))
-        steps, ray = 0, joined_rays(rays)
-        path, normals = entry_paths(ray, self._grid, self._dense), self._grid.face_normals
-        shifts = lateral_shifts(self._grid, rays, self._ior)
+        steps, normals = 0, self._grid.face_normals
+        numbers = 3 * (9 * len(flux) + self._grid.count)
+        most = max(2, min(KEPT_RAYS, KEPT_NUMBERS // max(numbers, 1)))
+        straights = [
+            kept(self._arriving, ray, partial(self._directional, ray), most) for ray in rays if len(ray.samples)
+        ]
         directed, inverse, along = np.zeros(len(flux)), np.zeros(len(flux)), np.zeros_like(flux)
         for channel, system in self._channels.items():
             emission = float(self._emitted[channel])
-            straight = system.directional(ray.entering[:, channel], ray.mirrored[:, channel], path, shifts)
+            straight = reduce(_DirectionalEffects.plus, (each[channel] for each in straights), system.nothing)
             directed, inverse = directed + straight.first.flux, inverse + straight.first.inverse
             along = along + straight.first.travel
             found = system.solved(
@@ -259,6 +268,15 @@ class BodySystem:
         total = flux.sum(axis=1)
         cosine, travel = _mean_cosine(total, directed, inverse), _mean_direction(total, directed, along, normals)
         return DiffuseSolution(fluence, flux, cells, inclusions, cosine, travel, leaving, passing, scattered, steps)
+
+    def _directional(self, ray: EnteringRays) -> dict[int, _DirectionalEffects]:
+        """Effects of rays that enter, by channel."""
+        path = entry_paths(ray, self._grid, self._dense)
+        shift = LateralShift.of(self._grid, ray, self._ior) if ray.from_one else None
+        return {
+            channel: system.directional(ray.entering[:, channel], ray.mirrored[:, channel], path, shift)
+            for channel, system in self._channels.items()
+        }
 
 
 def _mean_cosine(flux: Array, directed: Array, inverse: Array) -> Array:
@@ -292,6 +310,13 @@ class _DirectionalEffects:
     slab: Array
     power: Array
     reaching: Array
+
+    def plus(self, more: _DirectionalEffects) -> _DirectionalEffects:
+        """Effects of the rays of both."""
+        names = ("mirrored", "slab", "power", "reaching")
+        return _DirectionalEffects(
+            self.first.plus(more.first), *(getattr(self, name) + getattr(more, name) for name in names)
+        )
 
 
 class _ChannelSystem:
@@ -443,22 +468,24 @@ class _ChannelSystem:
         mean = self._chord / (2.0 * self._grid.body.mean_thickness)
         return self._grid.escape_paths(self._ior).probability(extinction * mean)
 
+    @cached_property
+    def nothing(self) -> _DirectionalEffects:
+        """Effects of no rays."""
+        none, travel = np.zeros(len(self._grid.points)), np.zeros((len(self._grid.points), 3))
+        first = ShiftedEvents(none, none, travel, none, none)
+        return _DirectionalEffects(first, none, none, np.zeros(self._grid.count), np.zeros(len(self._inclusions.lost)))
+
     def directional(
-        self, entering: Array, mirrored: Array, paths: EntryPaths, shifts: Sequence[LateralShift]
+        self, entering: Array, mirrored: Array, paths: EntryPaths, shift: LateralShift | None
     ) -> _DirectionalEffects:
         """Effects of rays that enter with a flux (k,), and are reflected with another: first events on their paths."""
-        count = len(self._grid.points)
-        if not len(paths.samples):
-            none, cells, inclusions = np.zeros(count), np.zeros(self._grid.count), np.zeros(len(self._inclusions.lost))
-            first = ShiftedEvents(none, none, np.zeros((count, 3)), none, none)
-            return _DirectionalEffects(first, none, none, cells, inclusions)
         events = self._first.of(paths)
-        first = self._first.shifted(paths, events, entering, shifts)
+        first = self._first.shifted(paths, events, entering, shift)
         power = events.power(self._grid, paths.samples, entering, first.above)
         reaching = self._inclusions.reaching(self._grid, paths, events.reached * entering)
         power = power + self._inclusions.sent(reaching)
         slab = self._in_walls((events.slab[0] * entering, events.slab[1] * entering), paths.samples)
-        reflected = np.asarray(np.bincount(paths.samples, mirrored, count), np.float64)
+        reflected = np.asarray(np.bincount(paths.samples, mirrored, len(self._grid.points)), np.float64)
         return _DirectionalEffects(first, reflected, slab, power, reaching)
 
     def at_inclusions(self, cells: Array, flux: Array, straight: _DirectionalEffects) -> Array:
