@@ -11,9 +11,8 @@ from translucent.gpu.passes.caustics import CausticsPass
 from translucent.gpu.passes.depth_peeling import DepthPeelingPass
 from translucent.gpu.passes.fragment_lists import FragmentListsPass, KBufferPass
 from translucent.gpu.passes.interfaces import InterfacesPass, SurfacesPass
-from translucent.gpu.passes.layers import LayersPass
 from translucent.gpu.passes.light_views import LightViewsPass
-from translucent.gpu.passes.opaque import BackdropPass, OpaquePass
+from translucent.gpu.passes.opaque import BackdropPass, LayersPass, OpaquePass
 from translucent.gpu.passes.path_trace import PathTracePass
 from translucent.gpu.passes.shadow_maps import ShadowMapsPass
 from translucent.gpu.passes.thickness import BackFaceDepthPass, SignedDepthPass, ThinLayerPass
