@@ -10,8 +10,8 @@ from scipy import sparse
 
 import translucent as tl
 from translucent.diffusion import field
-from translucent.diffusion.cell_system import MOST, TOLERANCE, KnownSolutions
-from translucent.diffusion.entering_rays import EnteringRays
+from translucent.diffusion.cell_system import MOST, TOLERANCE, KnownSolutions, conjugate_gradients
+from translucent.diffusion.entering_rays import EnteringRays, LateralShift
 from translucent.diffusion.field import DiffusingBody
 from translucent.diffusion.grid import body_grid
 from translucent.diffusion.lit_body import lit_body
@@ -41,6 +41,17 @@ def test_mixed_lights_take_no_steps() -> None:
     assert max(steps[2:]) <= 3
 
 
+def test_conjugate_gradients_solve() -> None:
+    values = np.random.default_rng(1).normal(size=(30, 30))
+    matrix, right_side = sparse.csr_array(values @ values.T + np.eye(30)), values[0]
+    found, steps = conjugate_gradients(matrix, right_side, values[1], lambda residual: residual, 1e-10)
+    np.testing.assert_allclose(matrix @ found, right_side, atol=1e-9)
+    assert 2 < steps <= 90
+    assert conjugate_gradients(matrix, right_side, found, lambda residual: residual, 1e-6)[1] == 0
+    found, steps = conjugate_gradients(matrix, 0.0 * right_side, values[1], lambda residual: residual, 1e-6)
+    assert (steps, np.abs(found).max()) == (0, 0.0)
+
+
 def test_solutions_depend_on_earlier_ones_only_with_warm_starts() -> None:
     body = tl.Object(Sphere().tessellate(24), MILK)
     lit, grid = lit_body(body, None, 0.25), VolumeGrid(body, 0.25)
@@ -57,15 +68,20 @@ def test_solutions_depend_on_earlier_ones_only_with_warm_starts() -> None:
 
 
 def test_light_that_stays_arrives_as_it_did(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Shadows of a light are found once, whatever happens to other lights and the sky, and again if it moves."""
-    found: list[object] = []
-    original = field.from_light
+    """Shadows and events of a light are found once, whatever other lights and the sky do, and again if it moves."""
+    found, shifted = list[object](), list[object]()
+    original, shift = field.from_light, LateralShift.of
 
     def counted(*given: Any) -> EnteringRays:
         found.append(given[2])
         return original(*given)
 
+    def counted_shift(*given: Any) -> LateralShift:
+        shifted.append(given[1])
+        return shift(*given)
+
     monkeypatch.setattr(field, "from_light", counted)
+    monkeypatch.setattr(LateralShift, "of", counted_shift)
     body = tl.Object(Sphere().tessellate(24), MILK)
     diffusing = DiffusingBody(lit_body(body, None, 0.25), MILK, 0.0)
     camera, white = tl.Camera.look_at((0, 0, 5), (0, 0, 0)), tl.Environment.constant((1, 1, 1))
@@ -76,10 +92,11 @@ def test_light_that_stays_arrives_as_it_did(monkeypatch: pytest.MonkeyPatch) -> 
         alone = DiffusingBody(lit_body(body, None, 0.25), MILK, 0.0)
         scene = tl.Scene([body], camera, lights, around)
         kept = diffusing.field(scene, 0)
-        asked = len(found)
+        asked, moves = len(found), len(shifted)
         assert np.array_equal(alone.field(scene, 0).fluence, kept.fluence)
-        del found[asked:]
+        del found[asked:], shifted[moves:]
     assert found == [stays, first, moved]
+    assert len(shifted) == 3
 
 
 def test_many_lights_are_no_worse_than_none_before() -> None:

@@ -553,27 +553,30 @@ class _ChannelSystem:
             # Light that nothing scatters or absorbs on its way through falls on other parts, too; rays see it alone.
             return entering + returned(leaving(fluence, flux) + self.through * flux)
 
-        near, flux, steps = self._cells.even(source(entering)), entering, 0
+        flux, given, steps = entering, source(entering), 0
+        near = self._cells.even(given)
         before, last = np.zeros_like(entering), min(TOLERANCE / part, FIRST)
         tolerance = last
         if returned is not None:
             flux, tolerance = received(at_surface(near, entering), entering), FIRST
+            given = source(flux)
         for _ in range(MOST_BOUNCES):
-            near, taken = self._cells.solved(source(flux), None if warm_starts else near, tolerance)
+            near, taken = self._cells.solved(given, None if warm_starts else near, tolerance)
             steps += taken
             fluence = at_surface(near, flux)
             change = received(fluence, flux) - flux
             # Fraction of the last change that returns now. In a hollow it is nearly all, and always the same: so much
             # is still to come.
-            again = float(change @ before) / max(float(before @ before), np.finfo(np.float64).tiny)
+            again = float((change * before).sum()) / max(float((before**2).sum()), _TINY)
             again = min(max(again, 0.0), MOST_RETURNED)
             flux = np.maximum(flux + change / (1.0 - again), 0.0)
             most = np.abs(flux + straight.first.flux).max(initial=0.0)
             largest = np.abs(change).max(initial=0.0)
             if tolerance == last and largest <= min(ENOUGH / part, MOST_MISSED) * (1.0 - again) * most:
                 break
-            tolerance = min(max(OF_CHANGE * largest / max(most, np.finfo(np.float64).tiny), last), FIRST)
+            tolerance = min(max(OF_CHANGE * largest / max(most, _TINY), last), FIRST)
             before = change if again == 0.0 else np.zeros_like(entering)
+            given = source(flux)
         # Emitted light leaves at each angle as what is scattered of uniform light does: with as much that enters.
         even = emitted / np.maximum(self._uniform[1], _TINY) if part == 1.0 and emission > 0.0 else 0.0
         return (
