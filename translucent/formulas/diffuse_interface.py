@@ -213,8 +213,21 @@ def _half_space(albedo: float, ior: float, phase: PhaseFunction) -> tuple[Array,
         bare = bare_half_space(albedo, phase, cosine, weight, 2 * MODE_NODES)
     mirrored, flux = _inside_reflectance(cosine, ior), cosine * weight
     # The transposed system: what leaves for each radiance that goes up for the first time.
-    leaving = np.linalg.solve((np.eye(len(cosine)) - bare * mirrored).T, flux * (1.0 - mirrored))
+    leaving = _solved_in_halves((np.eye(len(cosine)) - bare * mirrored).T, flux * (1.0 - mirrored))
     return cosine, flux, (leaving @ bare) / flux
+
+
+def _solved_in_halves(matrix: Array, right_side: Array) -> Array:
+    """Solution (n,) of a linear system (n, n), by its Schur complement.
+
+    LAPACK solves larger systems by threads, which wait for each other in busy loops for longer than that takes.
+    """
+    first, second = slice(None, len(matrix) // 2), slice(len(matrix) // 2, None)
+    beside = np.linalg.solve(matrix[first, first], matrix[first, second])
+    alone = np.linalg.solve(matrix[first, first], right_side[first])
+    rest = matrix[second, second] - matrix[second, first] @ beside
+    last = np.linalg.solve(rest, right_side[second] - matrix[second, first] @ alone)
+    return np.concatenate([alone - beside @ last, last])
 
 
 def _chandrasekhar_h(albedo: float, cosine: Array, weight: Array) -> Array:
