@@ -11,17 +11,22 @@ import translucent as tl
 from tests.command_line import Run
 from tests.preview.waiting import wait
 from translucent.assets import mesh_path
+from translucent.cli import cli
 from translucent.media.colors import parse_color
+from translucent.page import write
 from translucent.page.plans import PagePlan, plan_page
 from translucent.planning.request import RenderRequest
+from translucent.preview import exports
 from translucent.preview.actions import Action, ChoosePreset, SetField, SetOrbit
-from translucent.preview.document import Document, Look, Model, orbit_of
+from translucent.preview.document import Document, Export, Look, Model, orbit_of
 from translucent.preview.exports import Recipe, python_code, write_picture
 from translucent.preview.scenes import request_of
 from translucent.preview.workspace import Workspace
 from translucent.scene.scene import Scene
 
 SIZE = (48, 36)
+#: As few as show each of a picture's parts: see `test_as_many_samples_are_taken_wherever_none_are_asked_for`.
+SAMPLES = 4
 
 #: Options of the command line, arguments of `showcase`, and actions in the window.
 CASES: dict[str, tuple[list[str], tuple[object, ...], list[Action]]] = {
@@ -48,11 +53,11 @@ def test_a_picture_is_the_same_from_wherever_it_is_asked_for(
     case: str,
 ) -> None:
     options, arguments, actions = CASES[case]
-    sized = ("--size", f"{SIZE[0]}x{SIZE[1]}")
+    sized = ("--size", f"{SIZE[0]}x{SIZE[1]}", "--samples", str(SAMPLES))
     assert run("render", "bear", "-o", tmp_path / "a.npz", *sized, *options).code == 0
     pictures = {"command line": tmp_path / "a.npz"}
 
-    work = Workspace(Document(Model("bear"), look=Look(stage="auto")))
+    work = Workspace(Document(Model("bear"), look=Look(stage="auto"), export=Export(samples=SAMPLES)))
     work.size = SIZE
     wait(work, lambda: work.loaded is not None)
     for action in actions:
@@ -67,7 +72,7 @@ def test_a_picture_is_the_same_from_wherever_it_is_asked_for(
     scene, loaded = work.scene(), work.loaded
     assert scene is not None
     assert loaded is not None
-    write_picture(str(tmp_path / "b.npz"), scene, SIZE, request=request_of(work.document))
+    write_picture(str(tmp_path / "b.npz"), scene, SIZE, request=request_of(work.document), samples=SAMPLES)
     pictures["window"] = tmp_path / "b.npz"
     recipe = python_code(Recipe(work.document, loaded, scene, SIZE))
     monkeypatch.chdir(tmp_path)
@@ -82,15 +87,24 @@ def test_a_picture_is_the_same_from_wherever_it_is_asked_for(
         return recorded[-1]
 
     monkeypatch.setattr("translucent.page.plans.plan_page", plan)
+    monkeypatch.setattr("translucent.page.write.payload", lambda *_, **__: b"")  # no browser looks at it here
     assert run("page", "bear", "-o", tmp_path / "a.html", *sized, *options, "--poster", "none").code == 0
     with tl.Renderer() as renderer:
-        renderer.render(recorded[0].scene, SIZE, samples=16).save(tmp_path / "d.npz")
+        renderer.render(recorded[0].scene, SIZE, samples=SAMPLES).save(tmp_path / "d.npz")
         pictures["page"] = tmp_path / "d.npz"
-        renderer.render(_shown(mesh, arguments), SIZE, samples=16).save(tmp_path / "e.npz")
+        renderer.render(_shown(mesh, arguments), SIZE, samples=SAMPLES).save(tmp_path / "e.npz")
         pictures["Python"] = tmp_path / "e.npz"
     radiance = {name: _radiance(path) for name, path in pictures.items()}
     for name, found in radiance.items():
         np.testing.assert_allclose(found, radiance["command line"], atol=1e-3, err_msg=name)
+
+
+def test_as_many_samples_are_taken_wherever_none_are_asked_for() -> None:
+    options = {
+        (verb, option.name): option.default for verb in ("render", "page") for option in cli.commands[verb].params
+    }
+    told = {options["render", "samples"], options["page", "samples"], Document().export.samples}
+    assert {*told, exports.SAMPLES, write.SAMPLES} == {16}
 
 
 def _shown(mesh: tl.Mesh, arguments: tuple[object, ...]) -> Scene:
