@@ -8,6 +8,7 @@ import pytest
 
 from translucent.errors import InputError
 from translucent.gpu.context import DriverFaultError
+from translucent.gpu.passes import light_views
 
 
 @pytest.hookimpl(wrapper=True)
@@ -21,3 +22,15 @@ def pytest_runtest_call() -> Generator[None, None, None]:
         if "this OpenGL has no shader storage buffers" not in str(error):
             raise
         pytest.skip(str(error))
+
+
+@pytest.fixture(autouse=True)
+def small_views(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Views from lights of a 16th of the usual number of texels: enough for the small pictures of tests."""
+    monkeypatch.setattr(light_views, "_SIDES", (256, 128))
+
+
+@pytest.fixture
+def large_views(small_views: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Views from lights of the usual number of texels, for what is held to a ten-thousandth."""
+    monkeypatch.setattr(light_views, "_SIDES", (1024,))

@@ -65,6 +65,7 @@ def test_every_quadrature_goes_through_a_density(renderer: tl.Renderer, quadratu
     assert errors(renderer, scene, tl.RayMarched(steps=8, quadrature=quadrature)) <= (1e-4, 1e-5)
 
 
+@pytest.mark.usefixtures("large_views")
 def test_light_on_its_way_through_a_concave_body_meets_its_density(renderer: tl.Renderer) -> None:
     torus = tl.Object(Torus().tessellate(24), MILK, PLACED, density=NOISE)
     scene = tl.Scene([torus], CAMERA, [*LIGHTS["sun"], *LIGHTS["lamp"]], DUSK)

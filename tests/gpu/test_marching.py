@@ -32,6 +32,7 @@ def two_boxes(lights: list[Any], **options: Any) -> tl.Scene:
 
 @pytest.mark.parametrize("lights", LIGHTS.values(), ids=LIGHTS)
 @pytest.mark.parametrize("quadrature", [rule for rule in get_args(Quadrature) if rule != "jittered"])
+@pytest.mark.usefixtures("large_views")
 def test_every_quadrature_sums_as_the_reference_does(renderer: tl.Renderer, lights: list[Any], quadrature: Any) -> None:
     scene, method = two_boxes(lights), tl.RayMarched(steps=8, quadrature=quadrature)
     frame, truth = renderer.render(scene, SIZE, method), tl.reference.march(scene, SIZE, method)
