@@ -74,9 +74,7 @@ TRUTHS = {
 
 
 @pytest.mark.parametrize(("scene", "most", "paths"), TRUTHS.values(), ids=TRUTHS)
-def test_clouds_are_near_full_light_transport(
-    renderer: tl.Renderer, scene: tl.Scene, most: float, paths: int
-) -> None:
+def test_clouds_are_near_full_light_transport(renderer: tl.Renderer, scene: tl.Scene, most: float, paths: int) -> None:
     """Root mean square error over the mean, without the noise of the truth. Measured with 24 x 24 pixels and 192 paths:
     .005, .056, .00, .087; of single scattering .4 to 1.0.
     """
