@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 import translucent as tl
-from translucent.bake import strips
+from translucent.bake import check, scatter_job, strips
 from translucent.bake.settings import BakeSettings
 from translucent.bake.thickness_map import BakeReport, ThicknessMap, VertexThickness
 
@@ -103,3 +103,11 @@ def checkpoints_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Checkpoints of bakes after every strip, however short the time since the last one."""
     monkeypatch.setattr(strips, "EVERY", 0.0)
     monkeypatch.setattr(strips, "REST", 0.0)
+
+
+@pytest.fixture(autouse=True)
+def small_checks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Checks by pictures of 128 x 128 pixels, where no size is stated."""
+    for checked in (check.check_map, scatter_job.check_scatter):
+        sizes = [(128, 128) if isinstance(one, tuple) else one for one in checked.__defaults__ or ()]
+        monkeypatch.setattr(checked, "__defaults__", tuple(sizes))

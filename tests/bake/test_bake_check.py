@@ -125,7 +125,7 @@ def test_the_command_line_checks_what_it_wrote(
     assert main([*arguments, "--json"]) == 0
     (found,) = json.loads(capsys.readouterr().out)["check"].values()
     with Image.open(f"{path}.check.png") as image:
-        assert image.width == 3 * 480
+        assert image.width == 3 * 128
     # The mean over the cosine-weighted hemisphere of a ball is 4/3 of the radius, as is the mean chord of its disk.
     assert found["mean_thickness"] == pytest.approx(4 / 3 * 0.01, rel=0.03)
     assert abs(found["thickness"]["bias"]) < 0.05 * 0.01

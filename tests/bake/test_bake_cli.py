@@ -16,6 +16,7 @@ import trimesh
 
 import translucent as tl
 from tests.command_line import Result, Run, one_error_line
+from translucent.bake import batch
 from translucent.bake.gltf_builder import GlbBuilder
 from translucent.bake.record import sidecar_of
 from translucent.cli import main
@@ -94,9 +95,14 @@ def test_a_fine_mesh_is_baked_to_a_coarse_one(run: Run, ball: Path, tmp_path: Pa
     assert found[found > 0].min() > 2 * (1 - 0.005)
 
 
-def test_the_fine_mesh_may_be_one_of_the_toolkit(run: Run, tmp_path: Path) -> None:
-    result = run("sphere", "-o", tmp_path / "t.npy", *QUICK, "--mode", "normal", "--high", "sphere")
+def test_the_fine_mesh_may_be_one_of_the_toolkit(run: Run, make_ball: Any, tmp_path: Path) -> None:
+    coarse = make_ball(3, 0.02)
+    coarse.apply_translation((0.0, 0.02, 0.0)).export(tmp_path / "coarse.obj")
+    options = (*QUICK, "--mode", "normal", "--high", "sphere", "--high-distance", "5mm")
+    result = run(tmp_path / "coarse.obj", "-o", tmp_path / "t.npy", *options)
     assert result.code == 0, result.err
+    values = np.load(tmp_path / "t.npy")
+    np.testing.assert_allclose(values[values > 0.0], 0.04, rtol=2e-3)
 
 
 def test_vertices(run: Run, ball: Path, ball_glb: Path, tmp_path: Path) -> None:
@@ -249,16 +255,26 @@ def test_an_open_mesh_is_baked_with_a_warning(run: Run, tmp_path: Path, make_bal
 
 
 def test_many_models_and_a_bad_one(
-    run: Run, make_ball: Any, tmp_path: Path, without_processes: Callable[[], None]
+    run: Run, make_ball: Any, tmp_path: Path, without_processes: Callable[[], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     models = [tmp_path / f"{name}.obj" for name in ("a", "b", "c")]
     for model in models:
         make_ball(1).export(model)
     models[1].write_text("nothing")
     out = tmp_path / "maps" / "of today"
+    without_processes()
+    processes: list[int] = []
+    here: Any = batch.in_processes
+
+    def counted(task: Any, items: list[Any], workers: int, lost: Any) -> Any:
+        processes.append(workers)
+        return here(task, items, workers, lost)
+
+    monkeypatch.setattr(batch, "in_processes", counted)
     arguments = ("nobody", *models, "--out-dir", out, "--format", "png", *QUICK, "--jobs", 2)
     result = run(*arguments)
     assert result.code == 1
+    assert processes == [2]
     assert result.err.startswith("error: 2 of 4 models failed; the others are done")
     *rows, total = result.out.splitlines()
     assert [row.split()[0] for row in rows] == ["1/4", "2/4", "3/4", "4/4"]
@@ -271,7 +287,6 @@ def test_many_models_and_a_bad_one(
     assert sorted(path.name for path in out.iterdir()) == ["a.png", "a.png.json", "c.png", "c.png.json"]
     models[1].unlink()
     make_ball(1).export(models[1])
-    without_processes()
     result = run(*arguments[1:-1], 1, "--json")
     found = json.loads(result.out)
     assert [asset["status"] for asset in found["assets"]] == ["skipped", "baked", "skipped"]

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import translucent as tl
-from translucent.assets import mesh_path
 from translucent.bake import measure, strips
 from translucent.bake import rays as directions
 from translucent.bake import rays as following
@@ -25,9 +24,11 @@ MEDIUM = tl.Medium(absorption=(10.0, 20.0, 40.0))
 
 
 @pytest.fixture(scope="module")
-def bear() -> tl.Mesh:
-    """With texture coordinates."""
-    return tl.bake_thickness(tl.load_mesh(mesh_path("bear")), 64, mode="normal").mesh
+def bumpy() -> tl.Mesh:
+    """A ring with bumps, and with texture coordinates."""
+    ring = Torus(0.04, 0.012).tessellate(32)
+    bumps = 1.0 + 0.1 * np.sin(300.0 * ring.vertices[:, [1, 2, 0]])
+    return tl.bake_thickness(tl.Mesh(ring.vertices * bumps, ring.faces), 64, mode="normal").mesh
 
 
 def same(one: tl.ThicknessMap, other: tl.ThicknessMap) -> bool:
@@ -49,34 +50,34 @@ def same(one: tl.ThicknessMap, other: tl.ThicknessMap) -> bool:
     ids=str,
 )
 def test_the_same_bits_in_any_number_of_threads_and_chunks(
-    asked: dict, bear: tl.Mesh, monkeypatch: pytest.MonkeyPatch
+    asked: dict, bumpy: tl.Mesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    one = tl.bake_thickness(bear, 24, rays=16, threads=1, **asked)
-    assert same(one, tl.bake_thickness(bear, 24, rays=16, threads=2, **asked))
+    one = tl.bake_thickness(bumpy, 24, rays=16, threads=1, **asked)
+    assert same(one, tl.bake_thickness(bumpy, 24, rays=16, threads=2, **asked))
     for texels, rays in ((24 * 7, 1001), (1 << 20, 1 << 20)):
         monkeypatch.setattr(strips, "STRIP_TEXELS", texels)
         monkeypatch.setattr(measure, "CHUNK_RAYS", rays)
         monkeypatch.setattr(directions, "CACHED_RAYS", rays // 3)
         monkeypatch.setattr(following, "CACHED_RAYS", rays // 3)
         monkeypatch.setattr(following, "FOLLOWED_RAYS", rays // 5)
-        assert same(one, tl.bake_thickness(bear, 24, rays=16, threads=2, **asked))
+        assert same(one, tl.bake_thickness(bumpy, 24, rays=16, threads=2, **asked))
 
 
-def test_settings_and_their_keywords_are_one(bear: tl.Mesh) -> None:
+def test_settings_and_their_keywords_are_one(bumpy: tl.Mesh) -> None:
     asked = tl.BakeSettings(size=32, mode="normal", padding=2)
-    whole = tl.bake_thickness(bear, asked)
-    assert same(whole, tl.bake_thickness(bear, size=32, mode="normal", padding=2))
-    assert same(whole, tl.bake_thickness(bear, tl.BakeSettings(size=32, mode="normal"), padding=2))
+    whole = tl.bake_thickness(bumpy, asked)
+    assert same(whole, tl.bake_thickness(bumpy, size=32, mode="normal", padding=2))
+    assert same(whole, tl.bake_thickness(bumpy, tl.BakeSettings(size=32, mode="normal"), padding=2))
     assert whole.settings.summary() == asked.summary()
-    of_vertices = tl.bake_vertex_thickness(bear, asked)
-    assert np.array_equal(of_vertices.values, tl.bake_vertex_thickness(bear, mode="normal").values)
+    of_vertices = tl.bake_vertex_thickness(bumpy, asked)
+    assert np.array_equal(of_vertices.values, tl.bake_vertex_thickness(bumpy, mode="normal").values)
     assert (of_vertices.settings.size, of_vertices.settings.padding) == (1, 0)
     with pytest.raises(
         tl.InputError, match="thickness is baked per vertex; padding applies only to thickness maps; omit this setting"
     ):
-        tl.bake_vertex_thickness(bear, padding=2)
+        tl.bake_vertex_thickness(bumpy, padding=2)
     with pytest.raises(TypeError, match="unexpected keyword argument 'colour'"):
-        tl.bake_thickness(bear, colour="red")
+        tl.bake_thickness(bumpy, colour="red")
 
 
 def test_a_seed_makes_another_map_of_the_same_mesh() -> None:
@@ -124,10 +125,10 @@ def test_directions_have_the_density_that_is_said() -> None:
         assert abs(y.mean()) < 1e-3
 
 
-def test_a_tolerance_adds_rays_only_where_they_are_needed(bear: tl.Mesh) -> None:
-    plain = tl.bake_thickness(bear, 64, rays=16)
+def test_a_tolerance_adds_rays_only_where_they_are_needed(bumpy: tl.Mesh) -> None:
+    plain = tl.bake_thickness(bumpy, 64, rays=16)
     tolerance = float(np.median(plain.standard_error[plain.coverage])) / 2
-    fine = tl.bake_thickness(bear, 64, rays=16, tolerance=tolerance)
+    fine = tl.bake_thickness(bumpy, 64, rays=16, tolerance=tolerance)
     assert fine.report.max_standard_error <= tolerance
     assert fine.report.above_tolerance == 0
     assert 2 * plain.report.rays < fine.report.rays < 32 * plain.report.rays

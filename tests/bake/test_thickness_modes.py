@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from math import cos, exp, log, pi, radians, sin
 
 import numpy as np
@@ -12,7 +13,7 @@ from tests.solids import Box, Sphere, Torus
 from translucent.assets import mesh_path
 
 RADIUS, SEGMENTS = 0.03, 96
-SPHERE = Sphere(radius=RADIUS)
+SPHERE, TORUS = Sphere(radius=RADIUS), Torus(0.1, 0.02)
 #: Chords of the mesh and of the sphere differ by the sagitta at both ends, and where rays are nearly tangent by the
 #: part of a facet that they cut: together less than this share of the radius, in the mean over a cone.
 FACETS = 4.0 * SPHERE.sagitta(SEGMENTS)
@@ -20,6 +21,18 @@ FACETS = 4.0 * SPHERE.sagitta(SEGMENTS)
 #: at least the crease angle; the point itself is nearer by up to s.
 INSCRIBED = 2.0 * SPHERE.sagitta(SEGMENTS) * (1.0 + 1.0 / (1.0 - cos(radians(40.0))))
 MEDIUM = tl.Medium(absorption=(40.0, 40.0, 40.0))
+
+
+@cache
+def ball() -> tl.Mesh:
+    """`SPHERE` with texture coordinates, as a bake makes them."""
+    return tl.bake_thickness(SPHERE.tessellate(SEGMENTS), 32, mode="normal").mesh
+
+
+@cache
+def ring() -> tl.Mesh:
+    """`TORUS` with texture coordinates."""
+    return tl.bake_thickness(TORUS.tessellate(SEGMENTS), 32, mode="normal").mesh
 
 
 def covered(baked: tl.ThicknessMap) -> tuple[np.ndarray, np.ndarray]:
@@ -47,7 +60,7 @@ SPHERE_TRUTHS = [
 
 @pytest.mark.parametrize(("asked", "truth"), SPHERE_TRUTHS, ids=lambda value: str(value)[:50])
 def test_a_sphere(asked: dict, truth: float) -> None:
-    values, errors = covered(tl.bake_thickness(SPHERE.tessellate(SEGMENTS), 32, **asked))
+    values, errors = covered(tl.bake_thickness(ball(), 32, **asked))
     facets = {"local": 4.0 * FACETS / RADIUS, "inscribed": INSCRIBED}.get(asked["mode"], FACETS)
     assert (np.abs(values - truth) <= 3.0 * errors + facets).all()
     # The bias of all texels together is the mesh's alone.
@@ -57,7 +70,7 @@ def test_a_sphere(asked: dict, truth: float) -> None:
 
 def test_the_transmittance_of_a_colored_medium() -> None:
     medium = tl.Medium(absorption=(5.0, 40.0, 200.0))
-    values, errors = covered(tl.bake_thickness(SPHERE.tessellate(SEGMENTS), 48, mode="transmittance", medium=medium))
+    values, errors = covered(tl.bake_thickness(ball(), 48, mode="transmittance", medium=medium))
     weights, sigma = np.array([0.2126, 0.7152, 0.0722]), medium.extinction
     tau = 2 * RADIUS * sigma
     bright = (weights * 2 * (1 - (1 + tau) * np.exp(-tau)) / tau**2).sum()
@@ -71,9 +84,7 @@ def test_the_transmittance_of_a_colored_medium() -> None:
 def test_a_transmittance_that_underflows() -> None:
     """Nothing comes out of a narrow cone through 0.06 m at 1e6 / m, but the thickness is there all the same."""
     dense = tl.Medium(absorption=(1e6, 1e6, 2e6))
-    values, _ = covered(
-        tl.bake_thickness(SPHERE.tessellate(SEGMENTS), 24, mode="transmittance", spread=20.0, medium=dense)
-    )
+    values, _ = covered(tl.bake_thickness(ball(), 24, mode="transmittance", spread=20.0, medium=dense))
     assert (values > 2 * RADIUS * cos(radians(10)) - FACETS).all()
     assert (values <= 2 * RADIUS).all()
 
@@ -113,9 +124,9 @@ def test_a_slab_of_a_hundred_thousandth() -> None:
 
 
 def test_the_middle_of_a_box_against_quadrature() -> None:
-    """The mean over the hemisphere at the middle of a side: the exact chord, summed over 1000 x 1000 directions."""
+    """The mean over the hemisphere at the middle of a side: the exact chord, summed over 400 x 400 directions."""
     box = Box((0, 0, 0), (0.1, 0.2, 0.4))
-    grid = (np.arange(1000) + 0.5) / 1000
+    grid = (np.arange(400) + 0.5) / 400
     square, turn = (axis.ravel() for axis in np.meshgrid(grid, 2 * np.pi * grid))
     sine, cosine = np.sqrt(square), np.sqrt(1 - square)
     directions = np.stack([sine * np.cos(turn), sine * np.sin(turn), cosine], axis=1)
@@ -132,20 +143,18 @@ def test_the_middle_of_a_box_against_quadrature() -> None:
 
 @pytest.mark.parametrize("mode", ["normal", "inscribed"])
 def test_the_tube_of_a_torus(mode: str) -> None:
-    torus = Torus(0.1, 0.02)
-    values, _ = covered(tl.bake_thickness(torus.tessellate(96), 32, mode=mode))
-    assert (np.abs(values - 0.04) <= 6 * torus.sagitta(96)).all()
+    values, _ = covered(tl.bake_thickness(ring(), 32, mode=mode))
+    assert (np.abs(values - 0.04) <= 6 * TORUS.sagitta(SEGMENTS)).all()
 
 
 def test_gaps_of_a_torus_against_its_exact_chords() -> None:
     """First exit stops in the tube; the total goes on through the other side."""
-    torus = Torus(0.1, 0.02)
-    mesh = torus.tessellate(64)
+    mesh = TORUS.tessellate(64)
     first = tl.bake_vertex_thickness(mesh, spread=60.0)
     total = tl.bake_vertex_thickness(mesh, spread=60.0, gaps="total")
     inner = np.hypot(mesh.vertices[:, 0], mesh.vertices[:, 1]).argmax()
     assert total.values[inner] > 1.1 * first.values[inner]
-    grid = (np.arange(400) + 0.5) / 400
+    grid = (np.arange(100) + 0.5) / 100
     square, turn = (axis.ravel() for axis in np.meshgrid(np.sin(radians(30)) ** 2 * grid, 2 * np.pi * grid))
     sine, cosine = np.sqrt(square), np.sqrt(1 - square)
     inward = -mesh.vertices[inner] / np.linalg.norm(mesh.vertices[inner])
@@ -155,8 +164,8 @@ def test_gaps_of_a_torus_against_its_exact_chords() -> None:
         + np.outer(sine * np.cos(turn), up)
         + np.outer(sine * np.sin(turn), np.cross(up, inward))
     )
-    truth = torus.chord(mesh.vertices[inner], directions).mean()
-    assert abs(total.values[inner] - truth) <= 3 * total.standard_error[inner] + 20 * torus.sagitta(64)
+    truth = TORUS.chord(mesh.vertices[inner], directions).mean()
+    assert abs(total.values[inner] - truth) <= 3 * total.standard_error[inner] + 20 * TORUS.sagitta(64)
 
 
 def test_overlapping_parts() -> None:

@@ -11,6 +11,7 @@ import translucent as tl
 from translucent.assets import mesh_path
 from translucent.bench.cases import CASES, Case
 from translucent.bench.truth import CaseTruth, stored_truth
+from translucent.planning.scattering import Diffusion
 
 #: Error in a channel's mean, or in blocks of pixels, as a fraction of the mean, that no plan may keep to itself.
 SILENT = 0.05
@@ -19,6 +20,14 @@ SILENT = 0.05
 SCENES = [case for case in CASES if case.effect == "all light"]
 
 
+@pytest.fixture
+def cells_of_a_16th(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half as many cells across a body as by default: errors of the scenes are those of what is left out."""
+    monkeypatch.setattr(Diffusion.__init__.__wrapped__, "__defaults__", (16,))  # type: ignore[attr-defined]
+    assert Diffusion().resolution == 16
+
+
+@pytest.mark.usefixtures("cells_of_a_16th")
 @pytest.mark.parametrize("one", SCENES, ids=lambda one: one.name)
 def test_no_error_is_larger_than_the_notes_say(one: Case, renderer: tl.Renderer) -> None:
     """The largest percentage in the notes is that of what is left out."""
