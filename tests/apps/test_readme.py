@@ -53,16 +53,21 @@ def little(snippet: str) -> str:
 
 NEW_UV = atlas._new_uv
 
-#: What xatlas has made, which takes it seconds for a bear.
-UNWRAPPED: dict[tuple[bytes, bytes], Any] = {}
-
 
 def new_uv(mesh: tl.Mesh, size: int) -> Any:
-    """Texture coordinates, made once for each mesh, for a map of any size: pages need some, not the best."""
-    key = mesh.vertices.tobytes(), mesh.faces.tobytes()
-    if key not in UNWRAPPED:
-        UNWRAPPED[key] = NEW_UV(mesh, size)
-    return UNWRAPPED[key]
+    """Texture coordinates: pages need some, not the best.
+
+    xatlas takes seconds for a bear. So each face of a large mesh has a cell of its own instead.
+    """
+    count = len(mesh.faces)
+    if count < 2000:
+        return NEW_UV(mesh, size)
+    side = int(np.ceil(np.sqrt(count)))
+    cell = np.stack(np.divmod(np.arange(count), side), axis=1)[:, None]
+    uv = (cell + np.array([[0.1, 0.1], [0.9, 0.1], [0.1, 0.9]])) / side
+    vertex = mesh.faces.ravel().astype(np.int64)
+    faces = np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
+    return tl.Mesh(mesh.vertices[vertex], faces, uv.reshape(-1, 2), mesh.name, mesh.repairs), vertex
 
 
 @pytest.fixture

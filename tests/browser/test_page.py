@@ -110,7 +110,7 @@ def test_traced_glass_before_opaque(
 
 
 def test_rough_glass_on_a_stage(
-    web_page: WebPage, web_dist: Path, renderer: tl.Renderer, tmp_path: Path, tools: str
+    web_page: WebPage, web_dist: Path, renderer: tl.Renderer, tmp_path: Path, tools: str, few_shadows: None
 ) -> None:
     """Each sample has microfacets of its own; the ground has a map of shadows, which follows the medium."""
     size, samples = (48, 36), 4
