@@ -120,7 +120,7 @@ def test_no_light_is_lost(where: tuple[float, float, float], renderer: tl.Render
     box = tl.Object(Box((-4.0, -4.0, -4.0), (4.0, 4.0, 4.0)).tessellate())
     lamp, frosted = tl.PointLight(where, (1.0, 2.0, 3.0)), tl.Surface(roughness=0.3)
     objects = [ball(height=0.0, surface=frosted), tl.Object(CORE, tl.Medium(ior=1.2), priority=1), box]
-    renderer.render(scene(*objects, light=lamp, overlap="priority"), (8, 8), caustics=tl.Caustics(2_000))
+    renderer.render(scene(*objects, light=lamp, overlap="priority"), (8, 8), caustics=tl.Caustics(1_000))
     distance = float(np.linalg.norm(where))
     truth = 4.0 * np.pi if distance < 1 else 2.0 * np.pi * (1.0 - np.sqrt(1.0 - distance**-2))
     # What the facets of the ball cut off its disc; beside it a photon in a thousand is lost after many events.

@@ -106,7 +106,7 @@ def test_volumes_of_two_balls_that_overlap(renderer: tl.Renderer, assets: Path, 
     balls = [scan(assets / "meshes_clean" / f"ball{letter}.off") for letter in "AB"]
     truth = json.loads((assets / "truth" / "boolean.json").read_text())
     volumes = {}
-    size, height = (700, 700), 24.0
+    size, height = (450, 450), 24.0
     center = np.mean([ball.bounds.mean(axis=0) for ball in balls], axis=0)
     camera = tl.Camera.orthographic(center + (3, 4, 50), center, height=height)
     for policy in ("add", "union"):
@@ -255,7 +255,7 @@ def test_pixels_without_anything_have_no_layers(renderer: tl.Renderer, method: A
 
 def test_peeling_goes_on_in_batches(renderer: tl.Renderer) -> None:
     """Twelve shells need more passes than are folded at a time, and windings that wait in textures."""
-    scene, size = shells(12), (64, 48)
+    scene, size = shells(12), (48, 36)
     assert 2 * len(scene.objects) > 2 * PEEL_BATCH, "three batches"
     for order in ("both-ends", "front-to-back", "back-to-front"):
         assert_equal_to_reference(renderer, scene, size, tl.DepthPeeling(max_layers=100, order=order))

@@ -84,7 +84,7 @@ SCENES = {
             [SUN, tl.PointLight((2.0, 2.0, 3.0), 8.0)],
             BLACK,
         ),
-        60,
+        40,
     ),
     **{name: (scene, 120) for name, scene in TEXTURED.items()},
 }
@@ -107,7 +107,7 @@ def require_normal(found: Array) -> None:
 @pytest.mark.parametrize("name", SCENES)
 def test_the_picture_is_that_of_the_reference(name: str, renderer: tl.Renderer) -> None:
     scene, paths = SCENES[name]
-    frame = renderer.render(scene, SIZE, tl.PathTraced(400))
+    frame = renderer.render(scene, SIZE, tl.PathTraced(200))
     truth, error = path_trace(scene, SIZE, paths=paths, seed=1)
     assert frame.standard_error is not None
     difference = frame.radiance - truth.radiance
@@ -124,13 +124,13 @@ def test_the_picture_is_that_of_the_reference(name: str, renderer: tl.Renderer) 
 def test_lossless_bodies_vanish_in_a_furnace(renderer: tl.Renderer) -> None:
     """Rough, in media that scatter the channels differently: what one of them loses the others gain."""
     medium = tl.Medium(0.0, (0.5, 2.0, 8.0), anisotropy=0.5, ior=1.5)
-    frame = renderer.render(tl.Scene([ball(medium, FROSTED)], CAMERA, [], WHITE), SIZE, tl.PathTraced(1000))
+    frame = renderer.render(tl.Scene([ball(medium, FROSTED)], CAMERA, [], WHITE), SIZE, tl.PathTraced(500))
     assert frame.standard_error is not None
     require_normal(scores(frame.radiance - 1.0, np.square(frame.standard_error, dtype=np.float64)))
     assert frame.standard_error.max() < 0.1
     # Films and coats take nothing, either.
     surface = replace(FROSTED, iridescence=1.0, iridescence_ior=2.0, iridescence_thickness=3e-7, clearcoat=0.5)
-    frame = renderer.render(tl.Scene([ball(medium, surface)], CAMERA, [], WHITE), SIZE, tl.PathTraced(1000))
+    frame = renderer.render(tl.Scene([ball(medium, surface)], CAMERA, [], WHITE), SIZE, tl.PathTraced(500))
     assert frame.standard_error is not None
     require_normal(scores(frame.radiance - 1.0, np.square(frame.standard_error, dtype=np.float64)))
 
@@ -166,7 +166,7 @@ def test_a_lamp_with_a_size_is_found_through_what_bends(renderer: tl.Renderer) -
     for surface in (None, FROSTED):
         glass = ball(tl.Medium(ior=1.5), surface)
         one, other = (
-            renderer.render(tl.Scene([glass, grey, *more], camera, lights, BLACK), SIZE, tl.PathTraced(1000))
+            renderer.render(tl.Scene([glass, grey, *more], camera, lights, BLACK), SIZE, tl.PathTraced(800))
             for more, lights in (([], [lamp]), ([globe], []))
         )
         error = [np.sqrt(np.square(f.standard_error, dtype=np.float64).mean() / 64) for f in (one, other)]

@@ -9,6 +9,7 @@ so its chord lies between those of the solid shrunk and grown by that offset. No
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -109,26 +110,32 @@ def _pixel_in_metres(camera: tl.Camera, solid: Solid, directions: np.ndarray) ->
     return step * reach * (directions @ camera.forward)
 
 
+@functools.cache
+def _bounds(name: str, view: str) -> tuple[tl.Scene, np.ndarray, np.ndarray]:
+    """A scene, and the chords (h, w) of the shrunk and of the grown solid, which are the same for all methods."""
+    subject = SUBJECTS[name]
+    camera = CAMERAS[view](subject)
+    mesh = subject.solid.tessellate(SEGMENTS)
+    scene = tl.Scene([tl.Object(mesh, medium=tl.Medium(absorption=1.0))], camera)
+    origins, directions = camera.rays(SIZE)
+    offset = subject.solid.sagitta(SEGMENTS) + 16 * EPS * mesh.diagonal
+    offset += float(_pixel_in_metres(camera, subject.solid, directions).max()) / 256
+    rounding = 16 * EPS * mesh.diagonal / (directions @ camera.forward)
+    low = subject.grown(-offset).chord(origins, directions) - rounding
+    high = subject.grown(offset).chord(origins, directions) + rounding
+    return scene, low, high
+
+
 @pytest.mark.parametrize("view", CAMERAS)
 @pytest.mark.parametrize(("method", "name"), CLAIMS)
 def test_every_pixel_is_between_the_chords_of_the_shrunk_and_the_grown_solid(
     renderer: tl.Renderer, name: str, view: str, method: object
 ) -> None:
-    subject = SUBJECTS[name]
-    camera = CAMERAS[view](subject)
-    mesh = subject.solid.tessellate(SEGMENTS)
-    scene = tl.Scene([tl.Object(mesh, medium=tl.Medium(absorption=1.0))], camera)
+    scene, low, high = _bounds(name, view)
     frame = tl.reference.render(scene, SIZE) if method == "reference" else renderer.render(scene, SIZE, method)
-
-    origins, directions = camera.rays(SIZE)
-    offset = subject.solid.sagitta(SEGMENTS) + 16 * EPS * mesh.diagonal
-    offset += float(_pixel_in_metres(camera, subject.solid, directions).max()) / 256
-    low = subject.grown(-offset).chord(origins, directions)
-    high = subject.grown(offset).chord(origins, directions)
-    rounding = 16 * EPS * mesh.diagonal / (directions @ camera.forward)
     assert frame.valid.all()
-    assert (frame.thickness >= low - rounding).all()
-    assert (frame.thickness <= high + rounding).all()
+    assert (frame.thickness >= low).all()
+    assert (frame.thickness <= high).all()
     assert frame.coverage.any()
     assert (frame.thickness[~frame.coverage] == 0).all()
 

@@ -116,7 +116,7 @@ def test_without_events_it_is_what_is_seen_through() -> None:
 
 
 def test_a_backdrop_lights_like_its_mean() -> None:
-    white = Medium(scattering=50.0)
+    white = Medium(scattering=20.0)
     environment = Environment.checkerboard((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     scene = Scene([Object(BOX, white)], Camera.look_at((0, 0, 3), (0, 0, 0), fov_y=10), environment=environment)
     frame, _ = path_trace(scene, (2, 2), paths=16)
