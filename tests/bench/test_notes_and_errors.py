@@ -21,13 +21,13 @@ SCENES = [case for case in CASES if case.effect == "all light"]
 
 
 @pytest.fixture
-def cells_of_a_16th(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Half as many cells across a body as by default: errors of the scenes are those of what is left out."""
-    monkeypatch.setattr(Diffusion.__init__.__wrapped__, "__defaults__", (16,))  # type: ignore[attr-defined]
-    assert Diffusion().resolution == 16
+def cells_of_a_20th(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cells of a 20th of a body, larger than by default: errors of the scenes are those of what is left out."""
+    monkeypatch.setattr(Diffusion.__init__.__wrapped__, "__defaults__", (20,))  # type: ignore[attr-defined]
+    assert Diffusion().resolution == 20
 
 
-@pytest.mark.usefixtures("cells_of_a_16th")
+@pytest.mark.usefixtures("cells_of_a_20th")
 @pytest.mark.parametrize("one", SCENES, ids=lambda one: one.name)
 def test_no_error_is_larger_than_the_notes_say(one: Case, renderer: tl.Renderer) -> None:
     """The largest percentage in the notes is that of what is left out."""

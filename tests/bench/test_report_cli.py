@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from tests.bench.conftest import HASTE
 from tests.bench.provenance import PROVENANCE
 from tests.command_line import Run
 from translucent.assets import mesh_path
@@ -186,12 +187,13 @@ def nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
         return (MethodComparison(extra, methods, quick),)
 
     monkeypatch.setattr(measuring, "experiments", few)
+    monkeypatch.setattr(measuring, "QUICK", HASTE)
 
 
 SMALL = ("--quick", "--size", "64x48", "--methods", "signed-depth,constant-thickness")
 
 
-@pytest.mark.usefixtures("nothing_else")
+@pytest.mark.usefixtures("nothing_else", "empty_plots")
 def test_a_part_is_measured_anew_in_an_old_report(run: Run, new: Path, tmp_path: Path) -> None:
     result = run("--from", new, "--only", "shadows,hard-cases", "-o", tmp_path / "out")
     assert (result.code, result.err) == (0, "")
@@ -223,7 +225,7 @@ def test_a_model_of_the_user_is_measured(run: Run, tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == FILES
 
 
-@pytest.mark.usefixtures("nothing_else")
+@pytest.mark.usefixtures("nothing_else", "empty_plots")
 @pytest.mark.parametrize("medium", [["--preset", "merlot"], ["--color", "teal", "--distance", "5mm"]], ids=str)
 def test_a_medium_for_the_model_says_what_would_be_seen_in_it(run: Run, tmp_path: Path, medium: list[str]) -> None:
     more = ("--quick", "--size", "64x48", "--methods", "signed-depth,thin-layer")
@@ -246,7 +248,7 @@ def test_a_medium_for_the_model_says_what_would_be_seen_in_it(run: Run, tmp_path
     assert "color_difference.p999" in (tmp_path / "report.csv").read_text().splitlines()[0]
 
 
-@pytest.mark.usefixtures("nothing_else")
+@pytest.mark.usefixtures("nothing_else", "empty_plots")
 def test_interrupted_the_finished_scenes_are_written(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from translucent.bench.methods import MethodComparison
 
@@ -267,7 +269,7 @@ def test_interrupted_the_finished_scenes_are_written(run: Run, tmp_path: Path, m
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there a scene is finished")
-@pytest.mark.usefixtures("nothing_else")
+@pytest.mark.usefixtures("nothing_else", "empty_plots")
 def test_a_limit_ends_measuring_and_what_was_not_measured_is_named(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -295,7 +297,7 @@ def test_a_limit_ends_measuring_and_what_was_not_measured_is_named(
     assert "Not measured: case model bear, case model shell." in (tmp_path / "report.html").read_text()
 
 
-@pytest.mark.usefixtures("nothing_else")
+@pytest.mark.usefixtures("nothing_else", "empty_plots")
 def test_a_case_that_fails_leaves_the_others(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from translucent.bench.truth import CaseTruth
 
@@ -314,7 +316,7 @@ def test_a_case_that_fails_leaves_the_others(run: Run, tmp_path: Path, monkeypat
     assert "no luck" in (tmp_path / "report.html").read_text()
 
 
-@pytest.mark.usefixtures("nothing_else")
+@pytest.mark.usefixtures("nothing_else", "empty_plots")
 def test_a_model_that_is_no_solid_is_a_row_that_failed(run: Run, tmp_path: Path) -> None:
     result = run("leaf", "bear", "-o", tmp_path, *SMALL)
     assert result.code == 1
