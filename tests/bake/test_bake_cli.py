@@ -362,7 +362,7 @@ def test_an_interrupted_bake_goes_on(run: Run, ball: Path, tmp_path: Path, monke
     from contextlib import contextmanager
 
     path, kept = tmp_path / "t.npy", tmp_path / "t.npy.resume.npz"
-    arguments = (ball, "-o", path, "--size", 512, "--rays", 16)
+    arguments = (ball, "-o", path, "--size", 320, "--rays", 8)
     assert run(*arguments).code == 0
     whole = path.read_bytes()
     path.unlink(), sidecar_of(path).unlink()

@@ -80,9 +80,8 @@ def test_settings_and_their_keywords_are_one(bumpy: tl.Mesh) -> None:
         tl.bake_thickness(bumpy, colour="red")
 
 
-def test_a_seed_makes_another_map_of_the_same_mesh() -> None:
-    mesh = Torus().tessellate(32)
-    first, again, other = (tl.bake_thickness(mesh, 32, rays=16, seed=seed) for seed in (3, 3, 4))
+def test_a_seed_makes_another_map_of_the_same_mesh(bumpy: tl.Mesh) -> None:
+    first, again, other = (tl.bake_thickness(bumpy, 32, rays=16, seed=seed) for seed in (3, 3, 4))
     assert same(first, again)
     assert not np.array_equal(first.values, other.values)
     both = np.hypot(first.standard_error, other.standard_error)[first.coverage]
@@ -137,9 +136,8 @@ def test_a_tolerance_adds_rays_only_where_they_are_needed(bumpy: tl.Mesh) -> Non
     assert never.report.above_tolerance > 0
 
 
-def test_a_tolerance_that_is_met_changes_nothing() -> None:
-    mesh = Torus().tessellate(32)
-    assert same(tl.bake_thickness(mesh, 32), tl.bake_thickness(mesh, 32, tolerance=10.0))
+def test_a_tolerance_that_is_met_changes_nothing(bumpy: tl.Mesh) -> None:
+    assert same(tl.bake_thickness(bumpy, 32), tl.bake_thickness(bumpy, 32, tolerance=10.0))
 
 
 def holed(mesh: tl.Mesh, without: int) -> tl.Mesh:
@@ -251,8 +249,8 @@ def test_an_interruption_ends_the_threads(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.usefixtures("checkpoints_at_once")
-def test_a_checkpoint_is_taken_up_again(tmp_path: Path) -> None:
-    path, mesh = tmp_path / "map.partial", Torus().tessellate(32)
+def test_a_checkpoint_is_taken_up_again(bumpy: tl.Mesh, tmp_path: Path) -> None:
+    path, mesh = tmp_path / "map.partial", bumpy
     whole = tl.bake_thickness(mesh, 300, rays=4)
     with pytest.raises(KeyboardInterrupt):
         tl.bake_thickness(mesh, 300, rays=4, checkpoint=path, progress=interrupted(3))
@@ -265,11 +263,11 @@ def test_a_checkpoint_is_taken_up_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("checkpoints_at_once")
-def test_a_checkpoint_of_another_bake_is_refused(tmp_path: Path) -> None:
-    path, mesh = tmp_path / "map.partial", Torus().tessellate(32)
+def test_a_checkpoint_of_another_bake_is_refused(bumpy: tl.Mesh, tmp_path: Path) -> None:
+    path, mesh = tmp_path / "map.partial", bumpy
     with pytest.raises(KeyboardInterrupt):
         tl.bake_thickness(mesh, 300, rays=4, checkpoint=path, progress=interrupted(1))
-    for other, asked in ((mesh, {"seed": 1}), (Torus().tessellate(30), {})):
+    for other, asked in ((mesh, {"seed": 1}), (Torus().tessellate(16), {})):
         with pytest.raises(
             tl.InputError,
             match="the file holds an unfinished bake of another mesh, or with other settings; delete the file",

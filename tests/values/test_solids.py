@@ -108,7 +108,7 @@ def _sampled_length(inside: Inside, origins: Array, directions: Array, steps: Ar
 @pytest.mark.parametrize("distance", [3.0, 0.0])
 def test_chord_is_what_sampling_finds(name: str, distance: float) -> None:
     solid, inside = SOLIDS[name]
-    origins, directions = _rays(300, seed=1, distance=distance)
+    origins, directions = _rays(150, seed=1, distance=distance)
     steps = np.linspace(0.0, 8.0, 10_001)
     off = np.abs(solid.chord(origins, directions) - _sampled_length(inside, origins, directions, steps))
     # Where no step falls into an interval or a gap, it is missed: at most two, each shorter than a step.
