@@ -116,7 +116,9 @@ def test_lossless_bodies_vanish_on_a_white_ground(renderer: tl.Renderer, surface
     body = tl.Object(BALL, tl.Medium(scattering=20.0, ior=1.0 if surface is None else 1.4))
     camera = tl.Camera.look_at((1.0, 2.0, 5.0), (0, -0.4, 0), fov_y=40.0)
     scene = tl.Scene([body, ground], camera, environment=WHITE, environment_shadows=128)
-    off = np.abs(renderer.render(scene, (48, 48), samples=4, scattering=COARSE).radiance - 1.0)
+    off = np.abs(
+        renderer.render(scene, (48, 48), samples=4, scattering=COARSE, shadows=tl.ShadowMaps(256)).radiance - 1.0
+    )
     assert np.quantile(off, 0.99) < 0.05
     assert off.mean() < 0.01
 

@@ -27,7 +27,7 @@ def light_left(renderer: tl.Renderer, mesh: tl.Mesh, *, directions: int = 256, *
     """(h, w): fraction of the light that is left beside an opaque body, and points of the ground (h, w, 3)."""
     black = tl.Medium(absorption=(1e4, 1e4, 1e4))
     scene = tl.Scene([tl.Object(mesh, black), GROUND], ABOVE, [], EVEN, environment_shadows=directions)
-    frame = renderer.render(scene, SIZE, **{"shadows": tl.ShadowMaps(512)} | options)
+    frame = renderer.render(scene, SIZE, **{"shadows": tl.ShadowMaps(256)} | options)
     origins, _ = ABOVE.rays(SIZE)
     points = np.broadcast_to(origins * (1.0, 0.0, 1.0), (*SIZE, 3))
     return np.where(frame.coverage, np.nan, frame.radiance.mean(axis=-1)), points
@@ -69,9 +69,9 @@ def test_the_map_is_that_of_the_points(renderer: tl.Renderer, monkeypatch: pytes
     ball = Sphere(center=(0.0, 1.001, 0.0), radius=1.0).tessellate(32)
     # So small a picture needs few texels.
     monkeypatch.setattr("translucent.gpu.passes.shadow_maps.PIXELS_OF_TEXEL", 0.5)
-    found, points = light_left(renderer, ball, directions=32)
+    found, points = light_left(renderer, ball, directions=32, shadows=tl.ShadowMaps(512))
     monkeypatch.setattr("translucent.gpu.passes.shadow_maps._mapped_ground", lambda job: None)
-    expected, _ = light_left(renderer, ball, directions=32)
+    expected, _ = light_left(renderer, ball, directions=32, shadows=tl.ShadowMaps(512))
     error = np.abs(found - expected)[np.isfinite(found) & (np.abs(points).max(axis=-1) < 1.0)]
     assert np.median(error) < 1e-3
     assert error.max() < 4.0 / 32.0  # one direction with its cell, in the zenith
