@@ -139,7 +139,7 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 def test_deep_trees_are_those_of_the_reference(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ray_tree, "FAINTEST", 1e-5)
-    scene, bounces = SCENES[name](), 24
+    scene, bounces = SCENES[name](), 18
     light = traced_light(scene, depth=bounces + 1, forks=bounces + 1)
     truth = tl.reference.render(scene, SIZE, bounces=bounces)
     assert light.valid.all()

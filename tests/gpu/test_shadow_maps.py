@@ -21,7 +21,7 @@ from translucent.gpu.shadow_atlas import LEAST_TEXELS, MOST_BYTES, ShadowViews
 from translucent.scene.grounds import lit_side
 from translucent.scene.stages import staged
 
-SIZE = (96, 72)
+SIZE = (72, 54)
 DARK = tl.Environment.constant((0, 0, 0))
 CAMERA = tl.Camera.look_at((0, 3.5, 7), (0, -0.3, 0), fov_y=30)
 WINE, LEAF = tl.Medium(absorption=(0.5, 2, 1)), tl.Medium(absorption=(2, 0.3, 1))
@@ -284,7 +284,7 @@ def test_32_directions_are_within_a_few_percent_of_256(renderer: tl.Renderer) ->
     """And errors fall faster than with the square root of the number of directions."""
     environment = tl.Environment.gradient((0.2, 0.2, 0.2), (1, 1, 1.2))
     shown = scene("two media and a stone", environment=environment)
-    maps = tl.ShadowMaps(256)
+    maps = tl.ShadowMaps(128)
     many, *few = (renderer.render(replace(shown, environment_shadows=n), (48, 36), shadows=maps) for n in (256, 8, 32))
     floor = ~many.coverage
     coarse, fine = (
