@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import gzip
 import importlib.util
 import json
 import os
@@ -13,7 +14,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ import translucent as tl
 from tests.command_line import Result, Run
 from translucent.bake import batch
 from translucent.cli import main
+from translucent.page import container, write
 from translucent.planning.caustics import Caustics
 from translucent.planning.scattering import Diffusion
 from translucent.planning.shadow_maps import ShadowMaps
@@ -111,6 +113,14 @@ def coarse_light(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Diffusion.__init__.__wrapped__, "__defaults__", (12,))  # type: ignore[attr-defined]
     monkeypatch.setattr(Caustics.__init__.__wrapped__, "__defaults__", (20_000, 0))  # type: ignore[attr-defined]
     assert (Diffusion().resolution, Caustics().photons) == (12, 20_000)
+
+
+@pytest.fixture
+def quick_packing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages are packed quickly, and are larger for it: what is unpacked is the same."""
+    quick = SimpleNamespace(compress=lambda data, *_, **__: gzip.compress(data, 1), decompress=gzip.decompress)
+    monkeypatch.setattr(container, "gzip", quick)
+    monkeypatch.setattr(write, "gzip", quick)
 
 
 @pytest.fixture

@@ -264,7 +264,7 @@ def _viewer(folder: Path) -> Any:
     return lambda name: script
 
 
-@pytest.mark.usefixtures("headless")
+@pytest.mark.usefixtures("headless", "few_shadows", "coarse_light", "quick_packing")
 def test_show_writes_a_page_where_there_is_no_display(ball: trimesh.Trimesh) -> None:
     path = tl.show(ball, "merlot")
     assert path.suffix == ".html"
@@ -286,6 +286,7 @@ def test_show_fills_the_objects_of_a_scene(monkeypatch: pytest.MonkeyPatch) -> N
     assert len(shown[2].objects) == 1  # a scene has its own surroundings, and no stage is added
 
 
+@pytest.mark.usefixtures("few_shadows", "coarse_light", "quick_packing")
 def test_show_returns_a_widget_in_a_notebook(
     ball: trimesh.Trimesh, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import gzip
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.browser.pages import CHROMIUM_OPTIONS, WebPage, find_chromium
 from tests.browser.thickness import prepare
-from translucent.page import container, write
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -37,11 +34,8 @@ def chromium() -> Iterator[Browser]:
 
 
 @pytest.fixture(autouse=True)
-def quick_packing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pages are packed quickly, and are larger for it: what is unpacked is the same."""
-    quick = SimpleNamespace(compress=lambda data, *_, **__: gzip.compress(data, 1), decompress=gzip.decompress)
-    monkeypatch.setattr(container, "gzip", quick)
-    monkeypatch.setattr(write, "gzip", quick)
+def quick_pages(quick_packing: None) -> None:
+    """Pages are packed quickly."""
 
 
 @pytest.fixture
