@@ -71,7 +71,7 @@ def test_nothing_is_seen_of_lossless_bodies_beside_each_other() -> None:
 
 
 def test_a_body_in_another_one_does_not_receive_its_light_twice() -> None:
-    """What a body around it sends outwards does not reach it."""
+    """Light that the outer body sends outwards does not reach the inner body."""
     inner, outer = Sphere(radius=0.4).tessellate(16), Sphere().tessellate(16)
     shapes = [lit_body(tl.Object(mesh, LOSSLESS), None, 0.2) for mesh in (inner, outer)]
     assert not may_light(shapes[1], shapes[0])

@@ -384,7 +384,7 @@ def test_maps_of_shadows_are_planned_for_those_objects_that_end_them() -> None:
 
 
 def test_shadows_of_many_open_surfaces_are_sums_in_narrower_maps() -> None:
-    """Of a picture, lists tell which pixels are wrong; nobody asks of a shadow."""
+    """Sorted lists serve to find invalid pixels, which shadow maps do not have."""
     sun, sizes = tl.DirectionalLight((0, -1, 0), 1.0), (1.0, 0.99, 0.98, 0.97, 0.96)
     vertices = [vertex * size for size in sizes for vertex in OPEN.vertices]
     faces = [face + 8 * i for i in range(len(sizes)) for face in OPEN.faces]

@@ -36,7 +36,7 @@ class _WordsAreSearched(click.Group):
 
 
 def _search_hint(word: str) -> str:
-    """What to run for presets that have this word; empty if none has it."""
+    """Hint on the commands that show the presets with this word; empty if no preset has it."""
     from translucent.media.presets import matching
     from translucent.media.presets import presets as all_presets
 

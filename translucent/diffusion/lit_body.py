@@ -330,7 +330,7 @@ def lit_body(body: Object, opaque: OpaqueSurfaces | None, step: float) -> LitBod
 
 
 def may_light(other: LitBody, body: LitBody) -> bool:
-    """Whether `other` looks large enough from a body to light it, and does not enclose that body."""
+    """True if `other` looks large enough from a body to light it, and does not enclose that body."""
     (middle, radius), (center, _) = bounding_ball(other.casters.body), bounding_ball(body.casters.body)
     if radius**2 < LEAST_FACTOR * ((middle - center) ** 2).sum():
         return False
