@@ -16,7 +16,14 @@ from click.testing import CliRunner
 import translucent as tl
 from tests.benchmark.lambert import render
 from translucent.benchmark.adapters import ALL, Adapter, Session, run_adapter
-from translucent.benchmark.export import corner_thickness, divided, export_scene, lacking_in_mitsuba, mitsuba_scene
+from translucent.benchmark.export import (
+    corner_thickness,
+    divided,
+    environment_pixels,
+    export_scene,
+    lacking_in_mitsuba,
+    mitsuba_scene,
+)
 from translucent.benchmark.measures import _zoomed, score_picture, score_thickness, suspicions
 from translucent.benchmark.page import write_benchmark_page
 from translucent.benchmark.results import Results, SceneResult, merge, read_results, safe_name, unpacked
@@ -271,6 +278,11 @@ class TestCommand:
         glb = (folder / "scene.glb").read_bytes()
         assert glb[:4] == b"glTF"
         assert int.from_bytes(glb[8:12], "little") == len(glb)
+
+    def test_the_written_environment_has_the_exposure_and_the_rotation(self) -> None:
+        picture = np.random.default_rng(3).random((4, 8, 3)).astype(np.float32)
+        written = environment_pixels(tl.Environment.image(picture, exposure=-1.0, rotation=90.0))
+        np.testing.assert_allclose(written, 0.5 * np.roll(picture, -2, axis=1), rtol=1e-5)
 
     def test_thickness_below_corners_is_that_of_a_plate_and_a_ball(self) -> None:
         """Median over rays by the cosine: sqrt(2) times the thickness of a plate, and diameter of a ball by sqrt(2)."""

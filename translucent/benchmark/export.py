@@ -89,12 +89,13 @@ def export_scene(scene: BenchmarkScene, folder: Path) -> Path:
 
 
 def environment_pixels(environment: Environment) -> Array:
-    """(h, 2 h, 3) float32: radiance from all directions."""
-    if environment.kind == "image":
-        return np.asarray(environment.light_map.pixels, np.float32)
-    directions = texel_directions(ROWS, 2 * ROWS).reshape(-1, 3)
+    """(h, w, 3) float32: radiance from all directions, with the exposure and the rotation of a picture."""
+    height, width = ROWS, 2 * ROWS
+    if environment.map is not None:
+        width, height = environment.map.size
+    directions = texel_directions(height, width).reshape(-1, 3)
     radiance = environment.radiance(directions, np.zeros((len(directions), 2)))
-    return radiance.reshape(ROWS, 2 * ROWS, 3).astype(np.float32)
+    return radiance.reshape(height, width, 3).astype(np.float32)
 
 
 def hdr_of(pixels: Array) -> bytes:
