@@ -2,9 +2,11 @@
 // After one sample, a pixel needs more if the light within 5 x 5 pixels is not linear. After n samples, it needs more if its
 // standard error shows, deviation n^(-3/4), and it has fewer samples than the best number, which is in proportion to the power
 // 4/5 of the deviation. The deviation is the mean within 3 x 3 pixels, relative to the root of the light there; the error shows by
-// that mean or by the pixel's own deviation, whichever is larger. Pixels with the edge of an interface take all samples, as every
-// error of their mean shows. MIRROR: the same for the light that bodies add to what the ground mirrors, in samples that hit no
-// interface. measures: writes the deviations, and discards edges alone. Row 0 is the top row.
+// that mean or by the pixel's own deviation, whichever is larger. An isolated pixel needs more whatever its samples agree on: it
+// is brighter than all eight around it, or darker, by more than the error that shows and some standard errors. Pixels with the
+// edge of an interface take all samples, as every error of their mean shows. MIRROR: the same for the light that bodies add to
+// what the ground mirrors, in samples that hit no interface. measures: writes the deviations, and discards edges alone. Row 0 is
+// the top row.
 
 #include <constants>
 #include <View>
@@ -19,6 +21,7 @@ uniform float difference;          // one sample is enough up to this second dif
 uniform float much_lost;           // fraction of a pixel's light whose loss makes it invalid whatever other samples find
 uniform float error;               // standard error that is as good as none, as a fraction of the light
 uniform float wanted;              // samples of a pixel whose deviation is 1
+uniform float apart;               // standard errors by which an isolated pixel is off each of the eight around it, at least
 uniform int first;                 // 1: there is one sample so far
 uniform int measures;
 
@@ -45,7 +48,7 @@ void main() {
         if (measures == 1) { discard; }
         return;
     }
-    float sum = 0.0, count = 0.0, squares = 0.0, own_variance = 0.0, bends = 0.0;
+    float sum = 0.0, count = 0.0, squares = 0.0, own_variance = 0.0, bends = 0.0, own_level = 0.0, lowest = 1e30, highest = -1e30;
     for (int y = -1; y <= 1; ++y) {
         for (int x = -1; x <= 1; ++x) {
             ivec2 at = clamp(here + ivec2(x, y), ivec2(0), last);
@@ -61,6 +64,7 @@ void main() {
             sum += level;
 #endif
             count += 1.0;
+            if (at == here) { own_level = level; } else { lowest = min(lowest, level); highest = max(highest, level); }
             if (light.a > 1.0) {
                 float variance = max(texelFetch(bent_spread, at, 0).r - light.a * level * level, 0.0) / (light.a - 1.0);
                 squares += variance;
@@ -74,5 +78,7 @@ void main() {
     }
     unsettled = sqrt(squares / max(sum, 1e-30));
     bool good = max(squares, own_variance * count) * count <= pow(taken, 1.5) * error * error * sum * sum;
-    if (measures == 0 && (good || taken >= wanted * pow(unsettled, 0.8))) { discard; }
+    float off = count < 9.0 ? 0.0 : max(own_level - highest, lowest - own_level);
+    bool isolated = off > error * sum / count && off * off * pow(taken, 1.5) * count > apart * apart * squares;
+    if (measures == 0 && !isolated && (good || taken >= wanted * pow(unsettled, 0.8))) { discard; }
 }

@@ -188,15 +188,19 @@ def test_isolated_pixels_are_found_and_edges_are_not() -> None:
 def test_no_pixel_of_frosted_glass_is_far_off_its_neighbors(
     renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """More samples of a few pixels bring them back, and leave the mean of the picture where it is."""
+    """Isolated pixels take all samples, and then more: they come back, and the mean of the picture stays where it is."""
     frosted = ball(surface=tl.Surface(roughness=0.35))
     scene = dataclasses.replace(frosted, environment=tl.Environment.studio())
-    after = renderer.render(scene, (96, 72), samples=16)
-    with monkeypatch.context() as patch:
-        patch.setattr(adaptive, "ISOLATED", 1e9)
-        before = renderer.render(scene, (96, 72), samples=16)
-    count = [isolated_pixels(one.radiance.sum(axis=-1), one.coverage.astype(bool)).sum() for one in (before, after)]
+    none, apart, isolated = 1e9, adaptive.APART, adaptive.ISOLATED
+    pictures = []
+    for chosen in ((none, none), (apart, none), (apart, isolated)):
+        for name, value in zip(("APART", "ISOLATED"), chosen, strict=True):
+            monkeypatch.setattr(adaptive, name, value)
+        pictures.append(renderer.render(scene, (96, 72), samples=16))
+    monkeypatch.undo()
+    count = [isolated_pixels(one.radiance.sum(axis=-1), one.coverage.astype(bool)).sum() for one in pictures]
     assert count[0] > 10
-    assert count[1] < 0.2 * count[0]
-    means = [one.radiance[one.coverage].mean(dtype=np.float64) for one in (before, after)]
-    assert abs(means[1] / means[0] - 1.0) < 2e-3
+    assert count[1] < 0.7 * count[0]
+    assert count[2] < 0.2 * count[0]
+    means = [one.radiance[one.coverage].mean(dtype=np.float64) for one in pictures]
+    np.testing.assert_allclose(means, means[0], rtol=2e-3)

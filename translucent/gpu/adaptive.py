@@ -43,6 +43,10 @@ DIFFERENCE_TO_ERROR = 12.0**0.5
 #: pixel, as a multiple of those of the picture.
 FIRST_LOOK, MORE = 3, 2
 
+#: Standard errors by which a pixel is off each of the eight around it, at least, so that it takes all samples: few
+#: samples that agree may all have missed what is smaller than the pixel, or may all have hit it.
+APART = 2.0
+
 #: Of rough interfaces, a pixel is isolated that is farther from the median of the eight around it than so many spreads
 #: of the 24 around it, and from each of the eight by a fraction of that; and the least spread, as a fraction of the
 #: median. Isolated pixels have at most so many samples, in those of the picture.
@@ -70,10 +74,11 @@ class AdaptiveSampling:
 
     Of n samples at low-discrepancy points, a pixel with an edge has an error of about sigma n^(-3/4), with the standard
     deviation sigma of a sample (Mitchell 1996, "Consequences of stratified sampling in graphics"). Pixels have enough
-    where that does not show. A picture with the error that N samples of each pixel leave takes least time if a pixel
-    has samples in proportion to sigma^(4/5), N (sum sigma^(4/5) / sum sigma^2)^(2/3) sigma^(4/5) (Neyman 1934, "On the
-    two different aspects of the representative method", for that error). Deviations are those of the first samples,
-    relative to the root of the light, between an error of the light and one of its logarithm.
+    where that does not show, unless they are isolated: brighter than all eight around them, or darker, by what shows
+    and by more than `APART` standard errors. A picture with the error that N samples of each pixel leave takes least
+    time if a pixel has samples in proportion to sigma^(4/5), N (sum sigma^(4/5) / sum sigma^2)^(2/3) sigma^(4/5)
+    (Neyman 1934, "On the two different aspects of the representative method", for that error). Deviations are those of
+    the first samples, relative to the root of the light, between an error of the light and one of its logarithm.
 
     The first round finds for every sample which pixels show an interface, and sums up the light of all others:
     edges are as smooth as ever. The second traces rays; in each pixel, their mean replaces all of its
@@ -199,7 +204,8 @@ class AdaptiveSampling:
             part = mirrored_part(job, job.mirror)
             marked.append((("mirrored", "mirror_unsettled"), MIRROR_ERROR, MIRROR_LOST, part))
         finer = min(16.0 / samples, 1.0)
-        values = {"samples": samples, "most": _most(samples), "first": taken == 1, "wanted": 0.0, "measures": 1}
+        values = {"samples": samples, "most": _most(samples), "first": taken == 1, "apart": APART}
+        values |= {"wanted": 0.0, "measures": 1}
         own = [
             {**values, "difference": DIFFERENCE_TO_ERROR * finer * error, "error": finer * error, "much_lost": lost}
             for _, error, lost, _ in marked
