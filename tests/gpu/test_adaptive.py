@@ -188,7 +188,7 @@ def test_isolated_pixels_are_found_and_edges_are_not() -> None:
 def test_no_pixel_of_frosted_glass_is_far_off_its_neighbors(
     renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Isolated pixels take all samples, and then more: they come back, and the mean of the picture stays where it is."""
+    """Isolated pixels take all samples, and then more; the mean of the picture stays where it is."""
     frosted = ball(surface=tl.Surface(roughness=0.35))
     scene = dataclasses.replace(frosted, environment=tl.Environment.studio())
     none, apart, isolated = 1e9, adaptive.APART, adaptive.ISOLATED
