@@ -19,8 +19,8 @@ from PIL import Image
 
 import translucent as tl
 from translucent.assets import mesh_path
+from translucent.bake.scatter import LitAlone, exit_radiance
 from translucent.bake.scatter_job import Baked, check_scatter
-from translucent.diffusion.harmonics import LitAlone, exit_radiance
 from translucent.formulas.color import linear_to_srgb
 from translucent.geometry.normals import vertex_normals
 from translucent.scene.environment_map import texel_directions

@@ -34,6 +34,16 @@ const vec4 vertex_color = vec4(1.0);
 #endif
 #endif
 
+#if DIFFUSED && !DEPTH_ONLY
+uniform vec4 opaque_map[5];  // of `IrradianceMap`, the layer beside the corner
+
+IrradianceMap own_map() {
+    return IrradianceMap(opaque_map[0].xyz, opaque_map[1].xyz, opaque_map[2].xyz, opaque_map[3].xyz, opaque_map[4].xyz, opaque_map[0].w);
+}
+#else
+IrradianceMap own_map() { return NO_IRRADIANCE_MAP; }
+#endif
+
 layout(location = 0) out float opaque_axial_depth;
 #if !DEPTH_ONLY
 layout(location = 1) out vec4 radiance;
@@ -41,8 +51,7 @@ layout(location = 1) out vec4 radiance;
 
 #if !SURFACE && !DEPTH_ONLY
 vec3 diffuse_radiance(vec3 normal) {
-    vec3 irradiance = environment_irradiance(normal) * environment_reaching(from_center, normal);
-    irradiance = max(irradiance + ground_light(from_center, normal), 0.0);
+    vec3 irradiance = surrounding_irradiance(own_map(), from_center, normal);
     for (int light = 0; light < light_count; ++light) {
         vec3 sent = light_irradiance_on(light, from_center, normal);
         if (sent != vec3(0.0)) { irradiance += sent * light_reaching(light, from_center, normal); }
@@ -70,6 +79,7 @@ void main() {
     vec3 normal = gl_FrontFacing ? surface.normal : -surface.normal;
     float facing = dot(normal, ray);
     normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;
+    surface.map = own_map();
     vec3 light = opaque_radiance_of(surface, normal, ray, from_center);
 #else
     vec3 normal = normalize(world_normal);

@@ -5,11 +5,11 @@
 
 #include "lib/bsdf.glsl"
 #include "shade/environment_light.glsl"
-#include "shade/ground_light.glsl"
 #include "shade/highlight.glsl"
 #include "shade/lights.glsl"
 #include "shade/reflectance_table.glsl"
 #include "shade/shadows.glsl"
+#include "shade/ground_light.glsl"
 
 struct OpaqueSurface {
     vec3 base;          // albedo of the diffuse base, and reflectance of metal
@@ -26,6 +26,7 @@ struct OpaqueSurface {
     bool is_hole;
     vec3 film;          // fraction of the surface that has it, its ior, and metres
     vec2 clearcoat;     // fraction of the surface that has it, and its roughness
+    IrradianceMap map;
 };
 
 // Its bsdf for a direction to the eye.
@@ -106,8 +107,7 @@ vec3 opaque_environment(OpaqueSurface surface, OpaqueBsdf bsdf, vec3 normal, vec
     float last = surface.passed == vec3(0.0) ? 1.0 : -1.0;
     for (float side = 1.0; side >= last; side -= 2.0) {
         vec3 albedo = surface.unoccluded * (side > 0.0 ? bsdf.base : bsdf.passed);
-        vec3 irradiance = environment_irradiance(side * normal) * environment_reaching(point, side * normal);
-        sum += albedo * max(irradiance + ground_light(point, side * normal), 0.0) / PI;
+        sum += albedo * surrounding_irradiance(surface.map, point, side * normal) / PI;
     }
 #if CLEAR_COAT
     sum = (1.0 - bsdf.coated) * sum + surface.unoccluded * bsdf.coated * environment_light(direction, surface.clearcoat.y);

@@ -35,5 +35,5 @@ OpaqueSurface opaque_surface_at(vec3 base, vec3 normal, vec3 position, vec2 uv, 
     vec3 mapped = mapped_normal(normal, position, uv);
     return OpaqueSurface(base * textured.rgb, opaque_metallic * rough.b, clamp(opaque_roughness * rough.g, 0.0, 1.0), opaque_ior,
         opaque_passed, opaque_passed_share, emitted, mapped, normal_variance(mapped), textured.a, unoccluded(uv),
-        textured.a < opaque_hole_below, opaque_film, vec2(opaque_clearcoat, opaque_clearcoat_roughness));
+        textured.a < opaque_hole_below, opaque_film, vec2(opaque_clearcoat, opaque_clearcoat_roughness), NO_IRRADIANCE_MAP);
 }

@@ -22,11 +22,12 @@ from translucent.bake.record import sidecar_of
 from translucent.bake.scatter import (
     ATTRIBUTES,
     EXTRAS,
+    LitAlone,
+    exit_radiance,
     read_scatter_exr,
     read_scatter_glb,
 )
 from translucent.bake.scatter_job import Baked, check_scatter, environments
-from translucent.diffusion.harmonics import LitAlone, exit_radiance
 from translucent.formulas.spherical_harmonics import real_harmonics, scattered_radiance
 from translucent.geometry.normals import vertex_normals
 from translucent.geometry.solids import Sphere

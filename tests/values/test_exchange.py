@@ -7,12 +7,15 @@ import pytest
 
 import translucent as tl
 from translucent.arrays import Array, Integers
+from translucent.diffusion import irradiance_maps
 from translucent.diffusion.cache import FieldCache, ground_map
 from translucent.diffusion.entering import environment_parts, even_directions, opaque_surfaces, suns_of
 from translucent.diffusion.exchange import GroundPoints
 from translucent.diffusion.field import DiffusingBody
 from translucent.diffusion.lit_body import lit_body, may_light
+from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface
+from translucent.geometry.ray_caster import unit
 from translucent.geometry.solids import Box, Sphere
 from translucent.planning.plan import plan
 from translucent.planning.scattering import Diffusion
@@ -201,3 +204,23 @@ def test_objects_beside_a_body_are_not_inside() -> None:
     for item in (touching, ground(), room):
         found = FieldCache().of(plan(tl.Scene([ball, item], CAMERA), scattering=Diffusion(12)))
         assert found.surfaces[0].inclusions is None
+
+
+def test_light_on_a_ball_in_glass_is_what_its_surface_lets_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A black ball in the middle of a ball of glass: of its rays, those come back that the glass mirrors, to the ball.
+
+    A white one without losses is not there: it has the light of the environment.
+    """
+    monkeypatch.setattr(irradiance_maps, "SAMPLES", 256)
+    inner, glass = Sphere(radius=0.5).tessellate(48), tl.Medium((0.0, 0.3, 1.0), ior=1.5)
+    sine = np.sqrt((np.arange(1000) + 0.5) / 1000)  # of rays distributed as the cosine
+    metres = np.sqrt(1.0 - (0.5 * sine) ** 2) - 0.5 * np.sqrt(1.0 - sine**2)
+    mirrored = optics.fresnel_dielectric(np.sqrt(1.0 - (0.5 * sine) ** 2), 1.0 / 1.5)
+    let_in = np.exp(-np.multiply.outer(metres, glass.absorption)) * (1.0 - mirrored)[:, None]
+    normals = unit(np.array([(1, 0, 0), (0, -1, 0), (0.6, 0.0, 0.8), (-0.5, 0.5, -0.7)], np.float64))
+    for color, medium, expected in ((0.0, glass, let_in.mean(axis=0)), (1.0, tl.Medium(ior=1.5), np.ones(3))):
+        objects = tl.Object(Sphere().tessellate(64), medium), tl.Object(inner, None, color=(color,) * 3)
+        scene = tl.Scene(list(objects), CAMERA, environment=WHITE)
+        assert plan(scene).exchanging == (1,)
+        found = irradiance_maps.irradiance_maps(scene, (1,))[1].at(0.5 * normals, normals)
+        np.testing.assert_allclose(found / np.pi, np.tile(expected, (4, 1)), atol=0.02)

@@ -37,17 +37,18 @@ from translucent.bake.record import Record, write_record
 from translucent.bake.scatter import (
     MAP_SUFFIX,
     VERTEX_SUFFIX,
+    LitAlone,
     ScatterMap,
     VertexScatter,
     bake_scatter,
     bake_vertex_scatter,
+    exit_radiance,
     read_scatter_exr,
     read_scatter_glb,
     save_scatter_map,
     write_scatter_glb,
 )
 from translucent.bake.thickness_map import check_map_output
-from translucent.diffusion.harmonics import LitAlone, exit_radiance
 from translucent.errors import InputError
 from translucent.files.paths import write_atomically
 from translucent.formulas import optics

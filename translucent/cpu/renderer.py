@@ -179,8 +179,8 @@ class CpuRenderer:
             raise RenderError("rendering", "the renderer has been closed", "create a new renderer")
         started = time.perf_counter()
         scene, samples = plan.scene, plan.request.samples
-        ground = self._fields.of(plan).ground
-        scattered = None if ground is None else ground.irradiance
+        fields = self._fields.of(plan)
+        scattered = fields.on_opaque if fields else None
         shader = Shader.of(scene, plan, self._embree_meshes(scene), scattered)
         picture = PictureRays.of(scene.camera, size)
         arrays = _empty(picture.size)
@@ -405,7 +405,7 @@ class CausticLight(SurfaceLight):
         meshes: Mapping[Mesh, RayCaster],
         caustics: Caustics,
         bending: frozenset[int],
-        scattered: Callable[[Array, Array], Array] | None = None,
+        scattered: Callable[[Array, Array, Array], Array] | None = None,
     ) -> None:
         super().__init__(EmbreeLightPaths(scene, sheets, meshes), scattered)
         self._dark = SurfaceLight(EmbreeLightPaths(darkened(scene, bending), sheets, meshes))
@@ -519,7 +519,7 @@ class Shader:
         scene: Scene,
         plan: RenderPlan,
         meshes: Mapping[Mesh, RayCaster],
-        scattered: Callable[[Array, Array], Array] | None = None,
+        scattered: Callable[[Array, Array, Array], Array] | None = None,
     ) -> Shader:
         """Shader for a plan of the scene; `meshes` are all of it, `scattered` is as of `SurfaceLight`."""
         sheets = sheet_thicknesses(scene, plan.method)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from threading import Lock
 
@@ -15,6 +15,7 @@ from translucent.diffusion.entering import Occluders, bounding_ball, opaque_surf
 from translucent.diffusion.environment_ahead import behind_body
 from translucent.diffusion.exchange import BodyHits, GroundMap, GroundPoints, OpaqueSurfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_by_each_other
+from translucent.diffusion.irradiance_maps import IrradianceMap, irradiance_maps
 from translucent.diffusion.keys import (
     coefficients_of,
     diffusing_media,
@@ -60,15 +61,28 @@ class Fields:
     volumes : dict of int to VolumeField
     ground : GroundMap, optional
         Light that the bodies with surfaces send to a ground.
+    maps : dict of int to IrradianceMap
+        Light on opaque objects that interfaces and opaque objects send there.
     """
 
     surfaces: dict[int, DiffusionField]
     volumes: dict[int, VolumeField]
     ground: GroundMap | None = None
+    maps: dict[int, IrradianceMap] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
-        """True if light diffuses in any body."""
-        return bool(self.surfaces or self.volumes)
+        """True if there is any."""
+        return bool(self.surfaces or self.volumes or self.maps)
+
+    def on_opaque(self, points: Array, normals: Array, sky: Array) -> Array:
+        """(k, 3): irradiance at points (k, 3) of opaque objects by all but the straight light of lights.
+
+        `sky` (k, 3) is that of the environment, as far as nothing blocks it.
+        """
+        found = sky if self.ground is None else np.maximum(sky + self.ground.irradiance(points, normals), 0.0)
+        for own in self.maps.values():
+            found = np.where(own.holds(points)[:, None], own.at(points, normals), found)
+        return found
 
 
 NO_FIELDS = Fields({}, {})
@@ -100,7 +114,7 @@ class FieldCache:
 
         With caustics, photons carry what interfaces of other bodies bend into them.
         """
-        if not plan.diffuses:
+        if not plan.solves:
             return NO_FIELDS
         scene, diffusion, key = plan.scene, plan.diffusion, diffusion_key(plan)
         if (known := self._scenes.get(key)) is not None:
@@ -125,7 +139,9 @@ class FieldCache:
                 for i, medium in media.items()
                 if i not in bodies
             }
-            return Fields(surfaces, volumes, ground_map(scene, {i: own.lit for i, own in bodies.items()}, surfaces))
+            ground = ground_map(scene, {i: own.lit for i, own in bodies.items()}, surfaces)
+            maps = irradiance_maps(scene, plan.exchanging) if plan.exchanging else {}
+            return Fields(surfaces, volumes, ground, maps)
 
         with self._lock:
             return kept(self._scenes, key, make, KEPT_SCENES)

@@ -74,6 +74,23 @@ def bounding_ball(body: Object) -> tuple[Array, float]:
 
 def path_inside(body: Object, points: Array, directions: Array, distance: Array) -> Array:
     """(k,): metres inside a body from points (k, 3) in directions (k, 3), up to distances (k,)."""
+    line, reached, sign = _crossings(body, points, directions)
+    end = np.minimum(reached, distance[line])
+    return np.asarray(np.maximum(np.bincount(line, sign * end, len(points)), 0.0))
+
+
+def windings_at(scene: Scene, points: Array, directions: Array) -> npt.NDArray[np.int16]:
+    """(k, objects): how often points (k, 3) are in each body that is no sheet, by rays in directions (k, 3)."""
+    found = np.zeros((len(points), len(scene.objects)), np.int16)
+    for i, body in enumerate(scene.objects):
+        if body.medium is not None and body.sheet_thickness is None and not body.covers:
+            line, _, sign = _crossings(body, points, directions)
+            found[:, i] = np.maximum(np.rint(np.bincount(line, sign, len(points))), 0)
+    return found
+
+
+def _crossings(body: Object, points: Array, directions: Array) -> tuple[Integers, Array, Array]:
+    """Lines (n,) of k that cross a face of a body ahead, metres to there, and 1 where they leave it, -1 to enter."""
     mesh = body.mesh
     caster = ray_caster_of(mesh)
     into = np.linalg.inv(body.matrix[:3, :3])
@@ -92,8 +109,7 @@ def path_inside(body: Object, points: Array, directions: Array, distance: Array)
     ahead = reached > 0.0
     # Inside a body as often as faces ahead are exits, less entries; each that is passed changes that.
     sign = np.sign(slope)[ahead] * (-1.0 if mesh.diagnosis.inverted else 1.0)
-    line, end = line[ahead], np.minimum(reached[ahead], distance[line[ahead]])
-    return np.asarray(np.maximum(np.bincount(line, sign * end, len(points)), 0.0))
+    return line[ahead], reached[ahead], sign
 
 
 #: Directions in which each sample looks for the environment and for other parts of the body.

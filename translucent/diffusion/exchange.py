@@ -54,6 +54,14 @@ class OpaqueSurfaces:
     ----------
     objects : sequence of Object
         At least one of them has faces.
+
+    Attributes
+    ----------
+    objects : list of Object
+        Those with faces.
+    caster : RayCaster
+    first : (objects + 1,) int64
+        Number of the first face of each object in the mesh.
     """
 
     def __init__(self, objects: Sequence[Object]) -> None:
@@ -62,7 +70,7 @@ class OpaqueSurfaces:
         vertices, faces, _ = joined(parts, "opaque objects")
         self.caster = RayCaster(Mesh(vertices, faces))
         self._corners = np.asarray(vertices)[np.asarray(faces)]
-        self._first = np.cumsum([0, *(len(item.mesh.faces) for item in self.objects)])
+        self.first = np.cumsum([0, *(len(item.mesh.faces) for item in self.objects)])
 
     def normals(self, face: Integers) -> Array:
         """(k, 3): unit normals of faces (k,), by the order of their corners."""
@@ -73,10 +81,10 @@ class OpaqueSurfaces:
     def light(self, face: Integers, points: Array) -> tuple[Array, Array]:
         """(k, 3), (k, 3): fraction of the light that faces (k,) reflect at points (k, 3), and emitted radiance."""
         reflected, emitted = np.zeros((2, len(face), 3))
-        owner = np.searchsorted(self._first, face, side="right") - 1
+        owner = np.searchsorted(self.first, face, side="right") - 1
         for number in np.unique(owner):
             item, at = self.objects[number], np.flatnonzero(owner == number)
-            own, weights = face[at] - self._first[number], self._weights(face[at], points[at])
+            own, weights = face[at] - self.first[number], self._weights(face[at], points[at])
             color = np.broadcast_to(item.base_color, (len(at), 3))
             if item.mesh.colors is not None:
                 color = color * np.einsum("kc,kci->ki", weights, item.mesh.colors[item.mesh.faces[own]])[:, :3]
@@ -197,7 +205,7 @@ class Patches:
         first, patch = _grouped(places, normals, distance, step)
         points, normals, face = places[first], normals[first], face[first]
         reflected, emitted = surfaces.light(face, points)
-        owner, towards = _hemispheres(normals)
+        owner, towards = hemispheres(normals, PATCH_RAYS)
         start = (points + _BEFORE * distance[first, None] * normals)[owner]
         (own, sample), (other, part) = (surface.nearest(start, towards) for surface in (body, others))
         opaque = surfaces.caster.nearest(start, towards)[1]
@@ -263,19 +271,20 @@ def _grouped(places: Array, normals: Array, distance: Array, step: float) -> tup
     return order[new], patch
 
 
-def _hemispheres(normals: Array) -> tuple[Integers, Array]:
-    """Number of the patch, and direction, of `PATCH_RAYS` rays of each, distributed as the cosine with its normal."""
+def hemispheres(normals: Array, rays: int) -> tuple[Integers, Array]:
+    """Number of the patch, and direction, of so many rays of each, distributed as the cosine with its normal (k, 3)."""
     count = len(normals)
-    shift, first = box_points(count)[:, None, :2], plane_points(PATCH_RAYS)[None]
-    u, v = np.moveaxis((first + shift) % 1.0, -1, 0)
+    shift, first = box_points(count)[:, None, :2], plane_points(rays)[None]
+    owner, (u, v) = np.repeat(np.arange(count), rays), np.moveaxis((first + shift).reshape(-1, 2) % 1.0, -1, 0)
+    return owner, cosine_directions(normals[owner], u, v)
+
+
+def cosine_directions(normals: Array, u: Array, v: Array) -> Array:
+    """(k, 3): directions by numbers (k,), (k,) from 0 to 1, distributed as the cosine with normals (k, 3)."""
     level, angle = np.sqrt(u), 2.0 * np.pi * v
     across, along = tangents(normals)
-    towards = (
-        (level * np.cos(angle))[..., None] * across[:, None]
-        + (level * np.sin(angle))[..., None] * along[:, None]
-        + np.sqrt(1.0 - u)[..., None] * normals[:, None]
-    )
-    return np.repeat(np.arange(count), PATCH_RAYS), towards.reshape(-1, 3)
+    sideways = (level * np.cos(angle))[:, None] * across + (level * np.sin(angle))[:, None] * along
+    return np.asarray(sideways + np.sqrt(1.0 - u)[:, None] * normals)
 
 
 def tangents(normals: Array) -> tuple[Array, Array]:

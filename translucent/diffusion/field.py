@@ -29,7 +29,7 @@ from translucent.diffusion.grid import BodyGrid
 from translucent.diffusion.keys import dimming_key, environment_key, kept, light_key, may_dim
 from translucent.diffusion.lit_body import LitBody
 from translucent.diffusion.photons import EnteringPhotons
-from translucent.diffusion.sides import read_sides
+from translucent.diffusion.sides import beside, read_sides
 from translucent.diffusion.solution import BodySystem, DiffuseSolution
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, exit_quadrature
@@ -145,9 +145,9 @@ class DiffusionField:
         come `travel`, `inclusions` and `behind`, if there are any.
         """
         with np.errstate(under="ignore"):
-            sides = [_beside(self.fluence / self.scattered), _beside(self._scattered_entering)]
+            sides = [beside(self.fluence / self.scattered), beside(self._scattered_entering)]
         if self.travel is not None:
-            sides.append(_beside(self.travel))
+            sides.append(beside(self.travel))
         if self.inclusions is not None:
             sides.append(self.inclusions)
         return (*sides,) if self.behind is None else (*sides, self.behind.radiance)
@@ -220,12 +220,6 @@ class DiffusionField:
                     flux = flux + weight * once / (mu + mean) * excess
             scaled = found * self.exit_share * fluence / np.maximum(flux, 1e-30)
             return np.asarray(scaled / (4.0 * np.pi * self.ior**2))
-
-
-def _beside(sides: Volume) -> Volume:
-    """(2 x, 3 y, z, n): values (6, x, y, z, n) of the sides, beside each other."""
-    axes = [np.concatenate([sides[2 * axis], sides[2 * axis + 1]], axis=0) for axis in range(3)]
-    return np.ascontiguousarray(np.concatenate(axes, axis=1))
 
 
 class DiffusingBody:

@@ -25,6 +25,7 @@ def diffusion_key(plan: RenderPlan) -> Hashable:
     scene, caustics = plan.scene, plan.caustics
     followed = caustics is not None and media_lit_by_photons(scene)
     bending = (caustics.in_media, caustics.seed, _bending(scene)) if caustics is not None and followed else ()
+    exchange = (plan.exchanging, _bending(scene)) if plan.exchanging else ()
     bodies = tuple(
         (
             i,
@@ -41,7 +42,7 @@ def diffusion_key(plan: RenderPlan) -> Hashable:
     lights = tuple(light_key(light) for light in scene.lights)
     dimming = tuple((i, dimming_key(item)) for i, item in enumerate(scene.objects) if may_dim(item))
     shadows = bool(scene.environment_shadows)  # of bodies on a ground, see `ground_map`
-    return (plan.diffusion, bodies, opaque, lighting, lights, dimming, bending, shadows)
+    return (plan.diffusion, bodies, opaque, lighting, lights, dimming, bending, exchange, shadows)
 
 
 def environment_key(around: Environment) -> Hashable:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -86,10 +87,11 @@ class PhotonSegments:
 
 
 @dataclass(eq=False)
-class _Photons:
+class Photons:
     """Photons on their paths; `last` (n, groups) are the faces that they are on, -1 for none.
 
-    `windings` and `since` (n, objects) count how often they are in each object, and when they came in.
+    `windings` and `since` (n, objects) count how often they are in each object, and when they came in; `number` (n,)
+    tells them apart.
     """
 
     origins: Array
@@ -104,9 +106,16 @@ class _Photons:
     entered: Integers
     bent_before: Mask
     channel: Integers
+    number: Integers
 
-    def where(self, chosen: Mask | Integers) -> _Photons:
-        return _Photons(*(getattr(self, one.name)[chosen] for one in fields(self)))
+    def where(self, chosen: Mask | Integers) -> Photons:
+        """Selection of photons."""
+        return Photons(*(getattr(self, one.name)[chosen] for one in fields(self)))
+
+
+def joined(parts: Sequence[Photons]) -> Photons:
+    """All photons of some parts."""
+    return Photons(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Photons)))
 
 
 def photon_segments(scene: Scene, photons: int, seed: int) -> Iterator[PhotonSegments]:
@@ -122,7 +131,7 @@ def photon_segments(scene: Scene, photons: int, seed: int) -> Iterator[PhotonSeg
     seed : int
         Of the random numbers.
     """
-    tracer = _PhotonTracer(scene, np.random.default_rng((seed, 0x6D656469)))
+    tracer = PhotonTracer(scene, np.random.default_rng((seed, 0x6D656469)))
     for aim in photon_aims(scene, np.zeros(3), photons):
         starts = (plane_points(aim.photons) + tracer.rng.random(2)) % 1.0
         for first in range(0, aim.photons, BATCH):
@@ -130,12 +139,41 @@ def photon_segments(scene: Scene, photons: int, seed: int) -> Iterator[PhotonSeg
             for _ in range(MOST_SURFACES):
                 if not len(going.origins):
                     break
-                segments, going = tracer.step(going)
-                yield segments
+                step = tracer.step(going)
+                going = step.going
+                yield step.segments
 
 
-class _PhotonTracer:
-    """Tracer of photons through one scene."""
+class PhotonStep(NamedTuple):
+    """Photons after the next surface on their paths.
+
+    Attributes
+    ----------
+    segments : PhotonSegments
+        Up to there.
+    going : Photons
+        Photons that go on.
+    landed : Photons
+        Photons that have reached an opaque surface, `Photons.last`.
+    left : Photons
+        Photons with no surface ahead.
+    """
+
+    segments: PhotonSegments
+    going: Photons
+    landed: Photons
+    left: Photons
+
+
+class PhotonTracer:
+    """Tracer of photons through one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its bodies are closed, even, or sheets.
+    rng : Generator
+    """
 
     def __init__(self, scene: Scene, rng: np.random.Generator) -> None:
         self.scene, self.rng, objects = scene, rng, scene.objects
@@ -147,7 +185,7 @@ class _PhotonTracer:
         #: (objects, 3): in 1/m; what is scattered ahead counts as unscattered.
         self._extinction = np.stack([_reduced_extinction(item) for item in objects])
 
-    def begun(self, aim: PhotonAim, starts: Array) -> _Photons:
+    def begun(self, aim: PhotonAim, starts: Array) -> Photons:
         """Photons at the light, or where they come near the scene."""
         scene, count, objects = self.scene, len(starts), len(self.scene.objects)
         lights = np.tile(aim.light[:3], (count, 1))
@@ -172,29 +210,44 @@ class _PhotonTracer:
             directions = np.stack([level * np.cos(angle), level * np.sin(angle), up], axis=1)
             origins = lights
             power = cone_attenuation(directions, aim.cone)[:, None] * aim.flux / aim.photons
+        windings = np.zeros((count, objects), np.int16)
+        windings[:, list(aim.inside)] = 1
+        begun = self.begun_at(origins, directions, power, windings)
+        return begun.where(np.flatnonzero(begun.power.any(axis=1)))
+
+    def begun_at(self, origins: Array, directions: Array, power: Array, windings: npt.NDArray[np.int16]) -> Photons:
+        """Photons from points (n, 3) in unit directions (n, 3); `windings` (n, objects) count what they begin in.
+
+        Of nested bodies, they have entered smaller ones later.
+        """
+        count = len(origins)
         channel = np.full(count, 1)
         if self._table.dispersed:
             channel = self.rng.integers(3, size=count)
             power = power * 3.0 * np.eye(3)[channel]
-        windings = np.zeros((count, objects), np.int16)
-        windings[:, list(aim.inside)] = 1
-        lit = np.flatnonzero(power.any(axis=1))
-        since, last = np.zeros((count, objects), np.int64), np.full((count, self._caster.groups), -1)
-        filling = self._filling(windings, since)
-        unbent, nothing = np.zeros(count, dtype=bool), np.full(count, AIR)
-        begun = _Photons(
-            origins, directions, power, power, windings, since, last, filling, unbent, nothing, unbent, channel
+        smaller = np.argsort(np.argsort([-item.radius for item in self.scene.objects], kind="stable"))
+        since = np.where(windings > 0, smaller, 0)
+        last, filling = np.full((count, self._caster.groups), -1), self._filling(windings, since)
+        unbent, nothing, number = np.zeros(count, dtype=bool), np.full(count, AIR), np.arange(count)
+        return Photons(
+            origins, directions, power, power, windings, since, last, filling, unbent, nothing, unbent, channel, number
         )
-        return begun.where(lit)
 
-    def step(self, going: _Photons) -> tuple[PhotonSegments, _Photons]:
+    def surfaces_of(self, photons: Photons) -> tuple[Integers, Integers]:
+        """Opaque object (n,) that photons have landed on, and the number (n,) of its face."""
+        item = self._item[photons.last]
+        column = self._table.is_opaque[item].argmax(axis=1)
+        row = np.arange(len(column))
+        return item[row, column], self._caster.faces.number[photons.last[row, column]]
+
+    def step(self, going: Photons) -> PhotonStep:
         """Follow photons to the next surface, and on from there."""
         caster = self._caster
         face, distance = caster.nearest((going.origins - caster.center) / caster.radius, going.directions, going.last)
         nearest = distance.min(axis=1)
         found = np.isfinite(nearest)
         face = np.where(distance <= nearest[:, None] + TOGETHER, face, -1)[found]
-        going, length = going.where(found), nearest[found] * caster.radius
+        left, going, length = going.where(~found), going.where(found), nearest[found] * caster.radius
         filling = self._filling(going.windings, going.since)
         extinction = filling @ self._extinction
         points = going.origins + length[:, None] * going.directions
@@ -219,9 +272,10 @@ class _PhotonTracer:
         )
         # Behind a surface that refracts or reflects, no light comes straight from the other side.
         after.before = np.where(straight[:, None], filling, self._filling(after.windings, after.since))
-        return segments, self._surviving(after.where(np.flatnonzero(~lands & after.power.any(axis=1))))
+        further = self._surviving(after.where(np.flatnonzero(~lands & after.power.any(axis=1))))
+        return PhotonStep(segments, further, after.where(lands), left)
 
-    def _crossed(self, going: _Photons, face: Integers) -> tuple[npt.NDArray[np.int16], Integers]:
+    def _crossed(self, going: Photons, face: Integers) -> tuple[npt.NDArray[np.int16], Integers]:
         """Winding numbers (n, objects) beyond surfaces, and when photons came in."""
         windings, since = going.windings.copy(), going.since.copy()
         time = since.max(axis=1, initial=0) + 1
@@ -235,13 +289,13 @@ class _PhotonTracer:
 
     def _interacted(
         self,
-        going: _Photons,
+        going: Photons,
         face: Integers,
         points: Array,
         power: Array,
         windings: npt.NDArray[np.int16],
         since: Integers,
-    ) -> tuple[_Photons, Mask, Mask]:
+    ) -> tuple[Photons, Mask, Mask]:
         """Interact photons with surfaces, one random branch each; also masks of photons that go straight on or land.
 
         `power` is what each has left at the surface; `windings` and `since` hold on its other side.
@@ -274,7 +328,7 @@ class _PhotonTracer:
             power[own] *= weight
             straight[own] = transmitted & (at.thin_walled | (at.ior == 1.0))
             bent[own] = ~straight[own]
-        photons = _Photons(
+        photons = Photons(
             points,
             directions,
             power,
@@ -287,6 +341,7 @@ class _PhotonTracer:
             np.where(passes & (before != after), after, AIR),
             going.bent,
             going.channel,
+            going.number,
         )
         return photons, straight, lands
 
@@ -328,7 +383,7 @@ class _PhotonTracer:
         objects, solid = self.scene.objects, np.flatnonzero(self._table.is_solid).tolist()
         return [(i, j) for j in solid for i in solid if i < j and same_medium(objects[i], objects[j])]
 
-    def _surviving(self, photons: _Photons) -> _Photons:
+    def _surviving(self, photons: Photons) -> Photons:
         """Photons that survive Russian roulette, with a probability by the power that they have left."""
         left = np.max(photons.power / np.maximum(photons.started.max(axis=1, keepdims=True), 1e-300), axis=1)
         chance = np.minimum(left / ROULETTE, 1.0)

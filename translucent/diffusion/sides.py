@@ -153,6 +153,12 @@ def _fitted(weight: Floats, offset: Floats, normals: Floats) -> Floats:
     return np.asarray(share * (constant - slope @ np.swapaxes(offset, 1, 2)))
 
 
+def beside(sides: Floats) -> Floats:
+    """(2 x, 3 y, z, n): values (6, x, y, z, n) of the sides, beside each other: along an axis in a row."""
+    axes = [np.concatenate([sides[2 * axis], sides[2 * axis + 1]], axis=0) for axis in range(3)]
+    return np.ascontiguousarray(np.concatenate(axes, axis=1))
+
+
 def side_weights(normals: Array) -> Array:
     """(k, 6): how much each side counts for normals (k, 3) in the grid; all alike where there is none."""
     squares = normals**2

@@ -26,6 +26,8 @@ from translucent.scene.scene import Scene
 
 if TYPE_CHECKING:
     from translucent.diffusion.cache import FieldCache, Fields
+    from translucent.diffusion.field import DiffusionField
+    from translucent.diffusion.irradiance_maps import IrradianceMap
 
 
 #: Sizes of grids whose solutions are kept: a window has a small one while things move.
@@ -49,7 +51,8 @@ class DiffusedTexture:
     def __init__(self, gl: moderngl.Context, fields: Fields) -> None:
         self.fields = fields
         self.first_layers: dict[int, int] = {}
-        volumes = {number: field.volumes for number, field in (fields.surfaces | fields.volumes).items()}
+        parts = fields.surfaces | fields.volumes | fields.maps
+        volumes = {number: part.volumes for number, part in parts.items()}
         shapes = np.array([values.shape for arrays in volumes.values() for values in arrays])
         extent = shapes[:, 0].max(), shapes[:, 1].max(), shapes[:, 2].sum()
         if (ground := fields.ground) is not None:
@@ -73,15 +76,13 @@ class DiffusedTexture:
     @np.errstate(under="ignore")
     def rows(self, center: Array) -> dict[int, dict[str, npt.ArrayLike]]:
         """Fields of a `OBJECT_ROW` of each object, for positions that count from `center`."""
-        return {
+        maps = {
+            number: self._placed(number, own, own.values.shape[1:4], center) for number, own in self.fields.maps.items()
+        }
+        return maps | {
             number: {
+                **self._placed(number, field, field.fluence.shape[1:4], center),
                 "diffuses": 1.0,
-                "grid_low": field.low - center,
-                "grid_x": field.turn[:, 0] / field.step,
-                "grid_y": field.turn[:, 1] / field.step,
-                "grid_z": field.turn[:, 2] / field.step,
-                "grid_size": field.fluence.shape[1:4],
-                "first_layer": self.first_layers[number],
                 "albedo": field.albedo,
                 "turned": 0.0 if field.travel is None else 1.0 - field.phase.mean_cosine,
                 "phase": field.phase.parameters,
@@ -99,6 +100,29 @@ class DiffusedTexture:
             }
             for number, field in self.fields.surfaces.items()
         }
+
+    def _placed(
+        self, number: int, own: DiffusionField | IrradianceMap, size: tuple[int, ...], center: Array
+    ) -> dict[str, npt.ArrayLike]:
+        """Fields that place the grid of an object."""
+        return {
+            "grid_low": own.low - center,
+            "grid_x": own.turn[:, 0] / own.step,
+            "grid_y": own.turn[:, 1] / own.step,
+            "grid_z": own.turn[:, 2] / own.step,
+            "grid_size": size,
+            "first_layer": self.first_layers[number],
+        }
+
+    @np.errstate(under="ignore")
+    def map_uniform(self, number: int, center: Array) -> list[tuple[float, ...]]:
+        """Rows of `opaque_map` in ``shaders/shade/opaque.frag``; 0 for an object without a map."""
+        if (own := self.fields.maps.get(number)) is None:
+            return [(0.0,) * 4] * 5
+        placed = self._placed(number, own, own.values.shape[1:4], center)
+        names = "grid_low", "grid_x", "grid_y", "grid_z", "grid_size"
+        layer = (float(self.first_layers[number]), 0.0, 0.0, 0.0, 0.0)
+        return [(*map(float, np.asarray(placed[name])), w) for name, w in zip(names, layer, strict=True)]
 
 
 def ground_uniforms(light: DiffusedTexture | None, center: Array) -> dict[str, npt.ArrayLike]:
@@ -147,8 +171,13 @@ class DiffusionCache:
         self._last: DiffusedTexture | None = None
 
     def of(self, plan: RenderPlan) -> DiffusedTexture | None:
-        """Diffused light of the bodies of a plan, None where there is none."""
-        if not plan.diffuses or not (fields := self._solver(plan.diffusion).of(plan)):
+        """Diffused light of the bodies of a plan, None where there is none.
+
+        A window does not wait for the light on opaque objects in clear bodies.
+        """
+        if not (plan.diffuses if self.warm_starts else plan.solves) or not (
+            fields := self._solver(plan.diffusion).of(plan)
+        ):
             return None
         if self._last is None or self._last.fields is not fields:
             self._release_last()

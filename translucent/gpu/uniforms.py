@@ -178,7 +178,7 @@ _NO_DIFFUSION: Fields = {
     "grid_x": 0.0,
     "grid_y": 0.0,
     "grid_z": 0.0,
-    "grid_size": 1.0,
+    "grid_size": 0.0,
     "first_layer": 0.0,
     "albedo": 0.0,
     "turned": 0.0,
@@ -215,7 +215,7 @@ def object_rows(
     for i, body in enumerate(scene.objects):
         decides = i not in sheets and body.medium is not None and (body.has_interface or scene.overlap == "priority")
         own = {"rank": ranks[i] if decides else 0.0, "slot": numbers.setdefault(body.medium, len(numbers))}
-        diffusion = (diffused or {}).get(i, _NO_DIFFUSION)
+        diffusion = {**_NO_DIFFUSION, **(diffused or {}).get(i, {})}
         rows.append({**_medium(scene, body, sheets.get(i)), **_surface(body, sheets.get(i)), **own, **diffusion})
     return tuple(rows)
 

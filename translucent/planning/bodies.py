@@ -25,6 +25,58 @@ MAX_SLOTS = 16
 MOST_TEXELS = 1 << 24
 
 
+#: Opaque objects whose light is found by way of interfaces and of each other, at most: each takes half a second.
+MOST_EXCHANGING = 8
+
+#: Diagonal of such an object, in those of the clear bodies, up to which a map shows the shadows on it.
+LARGEST_EXCHANGING = 2.0
+
+
+def may_hold(body: Object, item: Object) -> bool:
+    """Whether an opaque object may be inside a body, so that it is lit by the light there."""
+    meet = (item.bounds[0] < body.bounds[1]).all() and (item.bounds[1] > body.bounds[0]).all()
+    return bool(meet) and item.mesh.diagnosis.solid
+
+
+def held_objects(scene: Scene) -> tuple[int, ...]:
+    """Numbers of the opaque objects that may be inside clear bodies."""
+    clear = _clear_bodies(scene)
+    return tuple(
+        i for i, item in enumerate(scene.objects) if item.medium is None and any(may_hold(body, item) for body in clear)
+    )
+
+
+def exchanging_objects(scene: Scene) -> tuple[int, ...]:
+    """Numbers of the opaque objects whose light is found by way of interfaces and of each other.
+
+    Those are objects in clear bodies, and others in such scenes that are no larger. None where too many would be, or
+    where paths cannot be traced: through media of varying density, and open meshes.
+    """
+    if not (held := held_objects(scene)) or any(
+        body.density is not None or not (body.sheet_thickness is not None or body.mesh.diagnosis.solid)
+        for body in scene.bodies
+    ):
+        return ()
+    largest = LARGEST_EXCHANGING * max(_diagonal(body) for body in _clear_bodies(scene))
+    found = tuple(
+        i
+        for i, item in enumerate(scene.objects)
+        if item.medium is None
+        and item.mesh.diagnosis.solid
+        and item.mesh.volume > 0.0
+        and (i in held or _diagonal(item) <= largest)
+    )
+    return found if len(found) <= MOST_EXCHANGING else ()
+
+
+def _clear_bodies(scene: Scene) -> list[Object]:
+    return [body for body in scene.bodies if body.has_interface and treatment_of(body) is not Treatment.DIFFUSION]
+
+
+def _diagonal(item: Object) -> float:
+    return float(np.linalg.norm(item.bounds[1] - item.bounds[0]))
+
+
 @dataclass(frozen=True, eq=False)
 class Slot:
     """Group of bodies that share one winding number.

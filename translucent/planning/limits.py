@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from translucent.planning.bodies import emitting_bodies, open_around_eye, open_bodies, scatters, sheets_of
+from translucent.planning.bodies import (
+    emitting_bodies,
+    held_objects,
+    may_hold,
+    open_around_eye,
+    open_bodies,
+    scatters,
+    sheets_of,
+)
 from translucent.planning.interfaces import InterfaceMode
 from translucent.planning.methods import Method
 from translucent.planning.passes import Note, NoteKind
@@ -186,7 +194,6 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: InterfaceM
         effects.append(Note(NoteKind.OPAQUE_SURFACES, text))
     effects += layer_effects(scene, interfaces=surfaces)
     effects += shadow_effects(scene) if scene.opaque else []
-    effects += reflected_effects(scene) if surfaces else []
     if scene.overlap != "priority" and len({body.priority for body in scene.bodies}) > 1:
         text = f'overlap="{scene.overlap}" ignores the priorities of objects'
         effects.append(Note(NoteKind.UNUSED_PRIORITIES, text))
@@ -238,16 +245,23 @@ def shadow_effects(scene: Scene) -> list[Note]:
     return notes
 
 
-def reflected_effects(scene: Scene) -> list[Note]:
-    """Notes on light that opaque objects in clear bodies do not get."""
-    clear = [body for body in scene.bodies if body.has_interface and treatment_of(body) is not Treatment.DIFFUSION]
-    if not (held := [item for item in scene.opaque if any(_may_hold(body, item) for body in clear)]):
-        return []
-    text = (
-        f"{object_names(held)}: up to 20 % too dark, without light that interfaces refract onto these objects, and "
-        "light that opaque objects reflect onto each other; --method path-traced includes this light"
-    )
-    return [Note(NoteKind.REFLECTED_LIGHT, text)]
+def reflected_effects(scene: Scene, exchanging: Sequence[int]) -> list[Note]:
+    """Notes on light that opaque objects in clear bodies do not get; `exchanging` are those with light of all kinds."""
+    held = held_objects(scene)
+    if held and exchanging and scene.lights:
+        text = (
+            f"{object_names([scene.objects[i] for i in held])}: lights shine on these objects straight through "
+            "interfaces, up to 20 % too bright; --method path-traced refracts light of lights with a size"
+        )
+        return [Note(NoteKind.REFLECTED_LIGHT, text)]
+    if left_out := [i for i in held if i not in exchanging]:
+        text = (
+            f"{object_names([scene.objects[i] for i in left_out])}: up to 20 % wrong, without light that interfaces "
+            "refract onto these objects, and light that opaque objects reflect onto each other; --method path-traced "
+            "includes this light"
+        )
+        return [Note(NoteKind.REFLECTED_LIGHT, text)]
+    return []
 
 
 def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> list[Note]:
@@ -290,12 +304,6 @@ def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> li
 STRONGLY_AHEAD = 0.5
 
 
-def _may_hold(body: Object, item: Object) -> bool:
-    """Whether an opaque object may be inside a body, so that it is lit by the light there."""
-    meet = (item.bounds[0] < body.bounds[1]).all() and (item.bounds[1] > body.bounds[0]).all()
-    return bool(meet) and item.mesh.diagnosis.solid
-
-
 def _subsurface_effects(scene: Scene) -> list[Note]:
     """Notes on bodies whose surfaces show light that they scatter many times."""
     notes = []
@@ -319,10 +327,10 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
             text += "; bright parts of the environment, scattered forward by the bodies, are up to 10 % wrong"
         if any(body.medium is not None and body.medium.emits for body in bodies):
             text += "; light that the bodies emit and scatter is up to 10 % too dark"
-        if held := [item for item in scene.opaque if any(_may_hold(body, item) for body in bodies)]:
+        if held := [item for item in scene.opaque if any(may_hold(body, item) for body in bodies)]:
             text += f"; the light around {object_names(held)} inside the bodies is wrong by up to 25 %"
         ground = ground_below(scene, [i for i, body in enumerate(scene.objects) if body in bodies])
-        beside = [item for item in scene.opaque if not any(_may_hold(body, item) for body in bodies)]
+        beside = [item for item in scene.opaque if not any(may_hold(body, item) for body in bodies)]
         if others := [item for item in beside if ground is None or item is not ground.ground]:
             text += f"; light from these bodies does not reach {object_names(others)}: up to 10 % too dark there"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))

@@ -15,6 +15,7 @@ from translucent.media.density import DensityGrid
 from translucent.planning.assembly import COSTS, assembled
 from translucent.planning.bodies import (
     MAX_SLOTS,
+    exchanging_objects,
     media_differ,
     medium_slots,
     open_around_eye,
@@ -55,6 +56,7 @@ from translucent.planning.limits import (
     layers_instead,
     mesh_limits,
     open_limits,
+    reflected_effects,
     shadow_effects,
     unmodelled_effects,
     with_ambient,
@@ -76,7 +78,14 @@ from translucent.planning.remarks import remarks
 from translucent.planning.render_plan import Capabilities, MapPlan, RenderPlan
 from translucent.planning.rendered import Treatment, darkened, occluder_scene, occluders, straight_scene, treatment_of
 from translucent.planning.request import RenderRequest
-from translucent.planning.scattering import Scattering, SingleScattering, Treatments, choose_treatments, rendered_scene
+from translucent.planning.scattering import (
+    Diffusion,
+    Scattering,
+    SingleScattering,
+    Treatments,
+    choose_treatments,
+    rendered_scene,
+)
 from translucent.planning.shadow_maps import ShadowMaps, shadow_passes, shadows_left_out, usual_maps
 from translucent.scene.lights import SPREADS, AreaLight, PositionalLight, SpotLight, with_points
 from translucent.scene.scene import Object, Scene, check_scene, object_names
@@ -144,6 +153,10 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
         rendered = rendered_scene(scene, treatments)
         found = _thickness(rendered, request, machine, ambient=_scatters_ambient(scene, treatments))
         notes = layers_instead(scene, treatments.refusals)
+        if found.interfaces is not None:
+            exchanging = exchanging_objects(rendered) if _exchanges(found.interfaces, request) else ()
+            found = replace(found, exchanging=exchanging)
+            notes = (*reflected_effects(rendered, exchanging), *notes)
         found = replace(found, diffusion=treatments.diffusion, unmodelled=(*found.unmodelled, *notes))
     else:
         _check_paths(scene, request, paths, machine)
@@ -180,6 +193,12 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
         found = replace(found, unmodelled=(*found.unmodelled, _denoised_note(found)))
     found = _with_textures(found, machine)
     return found if found.traced else _with_shadows(found, scene, machine)
+
+
+def _exchanges(interfaces: InterfaceMode, request: RenderRequest) -> bool:
+    """True if the light on opaque objects in clear bodies is found by way of the interfaces."""
+    scattering = request.scattering
+    return interfaces.traced and not request.over_backdrop and (scattering is None or isinstance(scattering, Diffusion))
 
 
 def _denoised_note(found: RenderPlan) -> Note:

@@ -116,6 +116,8 @@ class RenderPlan:
         How shadows on opaque objects are found, if the plan has the pass.
     maps : tuple of MapPlan
         Then, of the maps of lights, and of the maps of the environment if they differ.
+    exchanging : tuple of int
+        Numbers of the opaque objects whose light is found by way of interfaces and of each other.
     textured : bool
         Rays and photons on the GPU read textures of surfaces wherever they hit one.
     request : RenderRequest
@@ -138,6 +140,7 @@ class RenderPlan:
     opaque_to_shadows: frozenset[int] = frozenset()
     shadows: ShadowMaps = field(default_factory=ShadowMaps)
     maps: tuple[MapPlan, ...] = ()
+    exchanging: tuple[int, ...] = ()
     textured: bool = False
     request: RenderRequest = field(default_factory=RenderRequest, compare=False)
 
@@ -160,6 +163,11 @@ class RenderPlan:
     def diffuses(self) -> bool:
         """True if light is solved for on grids."""
         return bool(self.treated(Treatment.DIFFUSION, Treatment.VOLUME))
+
+    @property
+    def solves(self) -> bool:
+        """True if light is solved for before anything is drawn: on grids, or on opaque objects."""
+        return self.diffuses or bool(self.exchanging)
 
     @property
     def multiple_scattering(self) -> str:

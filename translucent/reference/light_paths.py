@@ -205,34 +205,38 @@ class SurfaceLight:
     paths : LightPaths
         Through the scene. Points are in metres from the eye of its camera, along the axes of the world.
     scattered : callable, optional
-        Irradiance (k, 3) by bodies in which light diffuses, for points (k, 3) and unit normals (k, 3) of opaque
-        objects in the world. It is below 0 where they keep more light of the environment from there than they send.
+        Irradiance (k, 3) by all but the straight light of lights, for points (k, 3) and unit normals (k, 3) of opaque
+        objects in the world, and the irradiance (k, 3) by what is visible of the environment.
     """
 
-    def __init__(self, paths: LightPaths, scattered: Callable[[Array, Array], Array] | None = None) -> None:
+    def __init__(self, paths: LightPaths, scattered: Callable[[Array, Array, Array], Array] | None = None) -> None:
         self.paths, self.scene, self._scattered = paths, paths.scene, scattered
         # A sheet with a diffuse base does not shadow that base.
         self._before = 2.0 * SHEET_ON_OPAQUE * paths.scene.diagonal
 
     def on_opaque(self, points: Array, normals: Array) -> Array:
         """Irradiance (k, 3) at points (k, 3) of opaque objects with unit normals (k, 3)."""
-        found = self._irradiance(points, normals, 0.0)
-        if self._scattered is None:
-            return found
-        return np.maximum(found + self._scattered(points + self.scene.camera.eye, normals), 0.0)
+        sky = self._sky(points, normals, 0.0)
+        if self._scattered is not None:
+            sky = self._scattered(points + self.scene.camera.eye, normals, sky)
+        return self._with_lights(sky, points, normals, 0.0)
 
     def on_interfaces(self, points: Array, normals: Array) -> Array:
         """Irradiance (k, 3) on layers, and on diffuse bases of interfaces; parameters as for `on_opaque`."""
-        return self._irradiance(points, normals, self._before)
+        return self._with_lights(self._sky(points, normals, self._before), points, normals, self._before)
 
     def to_interfaces(self, light: Light, points: Array) -> Array:
         """(k, 3): transmittance of the paths from one of `LightPaths.lights` to points (k, 3) of interfaces."""
         return self.passed(points, *direction_and_distance(light, points), self._before)
 
-    def _irradiance(self, points: Array, normals: Array, before: float) -> Array:
+    def _sky(self, points: Array, normals: Array, before: float) -> Array:
         irradiance = self.scene.environment.irradiance_on(normals)
-        if self.scene.environment_shadows:
-            irradiance = irradiance * self._sky_fraction(points, normals, before)
+        return (
+            irradiance * self._sky_fraction(points, normals, before) if self.scene.environment_shadows else irradiance
+        )
+
+    def _with_lights(self, irradiance: Array, points: Array, normals: Array, before: float) -> Array:
+        """(k, 3): irradiance (k, 3) with the straight light of lights."""
         for light in self.paths.lights:
             arriving = np.array(light.irradiance_on(points, normals))
             lit = np.flatnonzero(arriving.any(axis=1))

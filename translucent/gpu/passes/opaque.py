@@ -20,7 +20,7 @@ from translucent.gpu.passes.variants import Variants, coat_switches, look_switch
 from translucent.gpu.resources import Resources
 from translucent.gpu.shaders import set_uniform, set_used
 from translucent.gpu.textures import AnyTexture
-from translucent.gpu.uniforms import surface_fields
+from translucent.gpu.uniforms import media_center, surface_fields
 from translucent.media.colors import ColorLike
 from translucent.planning.passes import PassSpec
 from translucent.planning.shadow_maps import UNITS_WITH_SHADOWS
@@ -113,6 +113,8 @@ class OpaquePass:
             if ground is not None and mapped:
                 ground.texture.use(self._plain.units["ground_shadows"])
                 set_used(program, {"ground_rows": ground.rows, "mapped_ground": ground.plane})
+            if light is not None:
+                set_used(program, {"opaque_map": light.map_uniform(i, media_center(job.scene))})
             job.draw(program, (i,))
         job.gl.depth_func = "<"
 

@@ -1,0 +1,196 @@
+"""Irradiance on opaque objects by light that interfaces refract and reflect, and that opaque objects reflect.
+
+Random paths from samples of each object's surface gather it: they end at the environment, or at opaque objects, which
+light each other in a few rounds. Pictures look it up in a volume around the object, by the normal.
+
+References
+----------
+Goral, Torrance, Greenberg & Battaile 1984, "Modeling the interaction of light between diffuse surfaces"; Greger,
+Shirley, Hubbard & Greenberg 1998, "The irradiance volume".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import sparse
+
+from translucent.arrays import Array, Floats, Integers
+from translucent.diffusion.entering import Pose, dimming_bodies, light_passed, windings_at
+from translucent.diffusion.exchange import ROUNDS, OpaqueSurfaces, cosine_directions, direct_irradiance, hemispheres
+from translucent.diffusion.grid import BodyGrid, body_grid, nearest_samples
+from translucent.diffusion.lit_body import own_frame
+from translucent.diffusion.photons import BATCH, MOST_SURFACES, Photons, PhotonTracer, joined
+from translucent.diffusion.sides import SurfaceSides, beside, read_sides
+from translucent.scene.scene import Scene
+
+#: Samples on each object, and paths from each: the fit of the volume takes the mean of about 16 samples.
+SAMPLES, RAYS = 2048, 48
+
+#: Start of paths above the surface, as a fraction of a cell.
+_ABOVE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class IrradianceMap:
+    """Irradiance on an opaque object without the straight light of lights.
+
+    Attributes
+    ----------
+    values : (6, x, y, z, 3) float32
+        For each side, see `SurfaceSides`; as basic radiance, E / n^2 in a medium of index n.
+    low : (3,) float64
+        Corner of the grid in metres.
+    turn : (3, 3) float64
+        Axes of the grid, in its columns.
+    step : float
+        Side of a cell in metres.
+    """
+
+    values: Floats
+    low: Array
+    turn: Array
+    step: float
+
+    @property
+    def volumes(self) -> tuple[Floats]:
+        """Array (2 x, 3 y, z, 3) that pictures look up, with the sides beside each other."""
+        return (beside(self.values),)
+
+    def holds(self, points: Array) -> npt.NDArray[np.bool_]:
+        """(k,): whether points (k, 3) of the world are in the volume."""
+        place = self._places(points)
+        return np.asarray(((place >= 0.0) & (place <= self.values.shape[1:4])).all(axis=1))
+
+    def at(self, points: Array, normals: Array) -> Array:
+        """(k, 3): irradiance at points (k, 3) of the surface with normals (k, 3)."""
+        return read_sides(self.values, self._places(points), normals @ self.turn)
+
+    def _places(self, points: Array) -> Array:
+        return np.asarray((points - self.low) @ self.turn / self.step)
+
+
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """Samples of an opaque object: its grid, its pose, and the numbers of the samples among those of all objects."""
+
+    grid: BodyGrid
+    pose: Pose
+    numbers: Integers
+
+    @property
+    def points(self) -> Array:
+        return self.pose.outwards(self.grid.points) + self.pose.shift
+
+    @property
+    def normals(self) -> Array:
+        return self.pose.outwards(self.grid.face_normals)
+
+    def map(self, irradiance: Array) -> IrradianceMap:
+        cells = self.grid.cells
+        (values,) = SurfaceSides.of(self.grid).volumes([(irradiance[self.numbers], 0.0)])
+        low = self.pose.outwards(cells.low) + self.pose.shift
+        return IrradianceMap(values, low, self.pose.turn, cells.step)
+
+
+def irradiance_maps(scene: Scene, objects: Sequence[int]) -> dict[int, IrradianceMap]:
+    """Irradiance on closed opaque objects, by their numbers."""
+    samples: dict[int, _Samples] = {}
+    count = 0
+    for i in objects:
+        own = own_frame(scene.objects[i])
+        corners = own.world_vertices[own.mesh.faces]
+        sides = corners[:, 1:] - corners[:, :1]
+        area = 0.5 * float(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum())
+        grid = body_grid(own, np.sqrt(3.0 * area / SAMPLES))
+        samples[i] = _Samples(grid, Pose.of(scene.objects[i].matrix)[0], count + np.arange(len(grid.points)))
+        count += len(grid.points)
+    irradiance = _Gathering(scene, samples, count).irradiance()
+    return {i: own.map(irradiance) for i, own in samples.items()}
+
+
+class _Gathering:
+    """Paths from all samples, and the light that they find."""
+
+    def __init__(self, scene: Scene, samples: dict[int, _Samples], count: int) -> None:
+        self.scene, self.samples, self.count = scene, samples, count
+        self.tracer = PhotonTracer(scene, np.random.default_rng(0))
+        self.surfaces = OpaqueSurfaces(scene.opaque)
+        self.dimming = dimming_bodies(scene, -1)
+        self.points = np.concatenate([own.points for own in samples.values()])
+        self.normals = np.concatenate([own.normals for own in samples.values()])
+        steps = [np.full(len(own.numbers), own.grid.cells.step) for own in samples.values()]
+        self.starts = self.points + _ABOVE * np.concatenate(steps)[:, None] * self.normals
+        #: Index of each object of the scene among the opaque ones with faces.
+        numbers = {id(item): k for k, item in enumerate(self.surfaces.objects)}
+        self.opaque = np.array([numbers.get(id(item), -1) for item in scene.objects])
+        self.first: Array = np.zeros((count, 3))
+        #: Sample that receives light, sample that sends it, and the fraction that arrives.
+        self.links: list[tuple[Integers, Integers, Array]] = []
+
+    def irradiance(self) -> Array:
+        """(s, 3): irradiance at the samples."""
+        self._trace()
+        direct = self._direct(self.points, self.normals)
+        receiver, sender, fraction = (np.concatenate(part) for part in zip(*self.links, strict=True))
+        found = self.first.copy()
+        for channel in range(3):
+            exchange = sparse.csr_array((fraction[:, channel], (receiver, sender)), (self.count, self.count))
+            for _ in range(ROUNDS):
+                found[:, channel] = self.first[:, channel] + exchange @ (found[:, channel] + direct[:, channel])
+        return found
+
+    def _trace(self) -> None:
+        tracer = self.tracer
+        inside = windings_at(self.scene, self.starts, self.normals)
+        none = np.zeros(0, np.int64)
+        self.links.append((none, none, np.zeros((0, 3))))
+        for part in np.array_split(np.arange(self.count), self.count * RAYS // BATCH + 1):
+            own, directions = hemispheres(self.normals[part], RAYS)
+            owner = part[own]
+            whole = np.full((len(owner), 3), 1.0 / RAYS)
+            going = tracer.begun_at(self.starts[owner], directions, whole, inside[owner])
+            for _ in range(MOST_SURFACES):
+                if not len(going.number):
+                    break
+                step = tracer.step(going)
+                left = step.left
+                self._add(owner[left.number], left.power * np.pi * self.scene.environment.lighting(left.directions))
+                going = joined((step.going, self._land(owner, step.landed, *tracer.surfaces_of(step.landed))))
+
+    def _add(self, owner: Integers, light: Array) -> None:
+        for channel in range(3):
+            self.first[:, channel] += np.bincount(owner, light[:, channel], self.count)
+
+    def _land(self, owner: Integers, landed: Photons, item: Integers, face: Integers) -> Photons:
+        """Link the samples of paths to those where they have landed; on other objects, paths go on, diffusely."""
+        surfaces, points = self.surfaces, landed.origins
+        number = surfaces.first[self.opaque[item]] + face
+        reflected, emitted = surfaces.light(number, points)
+        normals = surfaces.normals(number)
+        normals = np.where((normals * landed.directions).sum(axis=1, keepdims=True) > 0.0, -normals, normals)
+        self._add(owner[landed.number], landed.power * np.pi * emitted)
+        fraction = landed.power * reflected
+        known = np.isin(item, list(self.samples))
+        for i in np.unique(item[known]):
+            own, here = self.samples[i], np.flatnonzero(item == i)
+            sender = nearest_samples(own.points, own.normals, own.grid.area, points[here], normals[here])
+            self.links.append((owner[landed.number[here]], own.numbers[sender], fraction[here]))
+        other = np.flatnonzero(~known)
+        if other.size and self.scene.lights:
+            self._add(owner[landed.number[other]], fraction[other] * self._direct(points[other], normals[other]))
+        further = landed.where(other)
+        further.power = fraction[other]
+        further.directions = cosine_directions(normals[other], *self.tracer.rng.random((2, other.size)))
+        return further
+
+    def _direct(self, points: Array, normals: Array) -> Array:
+        """(k, 3): irradiance of lights at points (k, 3) of opaque surfaces, straight through media."""
+
+        def passed(starts: Array, directions: Array, distance: Array) -> Array:
+            return light_passed(self.dimming, starts, directions, distance)
+
+        return direct_irradiance(points, normals, self.scene.lights, self.surfaces.caster, passed)
