@@ -508,12 +508,15 @@ def test_scattering_is_shown_and_not_warned_of(run: Run, tmp_path: Path) -> None
 def test_a_preset_brings_its_roughness_unless_one_is_given(run: Run, tmp_path: Path) -> None:
     command = ["render", "bear", "-o", tmp_path / "a.png", "--verbose", "--preset"]
     rough = "rough interfaces blur the light"
-    assert rough in run(*command, "jade", *SMALL).out
+    jade = run(*command, "jade", *SMALL).out
+    assert rough in jade
+    assert "--denoise" not in jade
     assert rough not in run(*command, "jade", "--roughness", "0", *SMALL).out
+    assert "advice: 'bear.ply' is rough and clear" in run(*command, "frosted_glass", *SMALL).out
     assert rough in run("explain", "bear", "--preset", "jade").out
     assert rough not in run("explain", "bear", "--preset", "amber").out
-    jade, amber = MediumOptions(preset="jade"), MediumOptions(preset="amber")
-    assert [jade.surface_roughness(one) for one in (0.5, 0.0, None)] == [0.5, 0.0, 0.15]
+    stone, amber = MediumOptions(preset="jade"), MediumOptions(preset="amber")
+    assert [stone.surface_roughness(one) for one in (0.5, 0.0, None)] == [0.5, 0.0, 0.15]
     # A preset that says nothing of surfaces leaves a file's as they are.
     assert (amber.surface_roughness(), MediumOptions().surface_roughness()) == (None, None)
 

@@ -148,7 +148,7 @@ def test_a_material_is_saved_and_found(tmp_path: Path) -> None:
     assert found is not None
     assert (found.medium, found.roughness, found.group) == (medium_of(material), 0.25, "own")
     first = next(iter(own.groups().items()))
-    assert first == ("popular", [tl.preset(name) for name in ("jade", "wax", "whole_milk", "red_wine", "crystal")])
+    assert first == ("popular", [tl.preset(name) for name in ("jade", "wax", "whole_milk", "red_wine", "clear_glass")])
     own.search = "wax"
     assert next(iter(own.groups().values()))[0].name == "wax"
     own.search = "my marb"

@@ -104,7 +104,7 @@ def test_every_preset_has_a_group_and_a_search_finds_it() -> None:
     ("words", "first"),
     [
         ("wax", "wax"),
-        ("glass", "crystal"),
+        ("glass", "clear_glass"),
         ("milk", "whole_milk"),
         ("whole milk", "whole_milk"),
         ("jade", "jade"),

@@ -50,7 +50,8 @@ from translucent.commands.options import (
     verbose_option,
 )
 from translucent.errors import InputError
-from translucent.planning.passes import NoteKind
+from translucent.extras import install_command
+from translucent.planning.passes import NoteKind, PassName
 from translucent.units import METRES_PER_UNIT, extent_text, metres_per_unit, short_length
 
 if TYPE_CHECKING:
@@ -286,7 +287,10 @@ def render(model: str, given: RenderOptions, as_json: bool) -> None:
             echo(str(frame.plan))
             echo(", ".join(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in summary["seconds"].items()))
         # What the picture says of darkness is more than what its plan does.
-        echo_advice(scene, [note for note in frame.plan.remarks if not (black and note.kind is NoteKind.BLACK)])
+        remarks = [str(note) for note in frame.plan.remarks if not (black and note.kind is NoteKind.BLACK)]
+        if not request.denoise and not pictures.tiled and (grain := grain_text(frame, scene)):
+            remarks.append(grain)
+        echo_advice(scene, remarks)
     for text in filter(None, (black, white)):
         echo(f"warning: {text}", err=True)
 
@@ -481,6 +485,18 @@ def black_text(scene: Scene, frame: Frame, unit: str, *, own: bool = False) -> s
         f"{short_length(thickness)} thick (median), and a tenth of the light is left after {short_length(tenth)} in "
         f"this medium; {_other_unit(high - low, depth, unit, own) or clearer}"
     )
+
+
+def grain_text(frame: Frame, scene: Scene) -> str:
+    """Advice against the noise of clear bodies with rough surfaces; empty for other scenes."""
+    from translucent.frames.denoising import CLEAR
+
+    clear = [one for one in scene.bodies if one.has_interface and one.medium and not np.any(one.medium.scattering)]
+    rough = [item.mesh.name for item in clear if item.surface is not None and item.surface.roughness > CLEAR]
+    if not rough or not any(step.name is PassName.TRACED for step in frame.plan.passes):
+        return ""
+    install = install_command("denoise")
+    return f"'{rough[0]}' is rough and clear, which leaves grain: --denoise takes it away ({install})"
 
 
 def white_text(frame: Frame, exposure: float, tone: str) -> str:

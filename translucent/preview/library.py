@@ -49,7 +49,7 @@ from translucent.version import VERSION
 WATCH = 1.0
 
 #: Presets that people look for first, and their heading.
-FIRST, POPULAR = ("jade", "wax", "whole_milk", "red_wine", "crystal"), "popular"
+FIRST, POPULAR = ("jade", "wax", "whole_milk", "red_wine", "clear_glass"), "popular"
 
 #: Source of presets that are saved here.
 SAVED = "saved in the previewer"
