@@ -11,7 +11,8 @@ a quarter of 640 x 480 pixels; ``knot`` a knot of the same glass; ``empty`` the 
 `render` shows it, in 240 x 135 pixels; ``rim`` the rim of a goblet of glass on the same stage, from near by. ``light``,
 ``medium``, ``index``, ``pose`` and ``mesh`` are no frames: light that diffuses in a bear is solved for again after a
 change of the sun and the environment, of absorption, of the index of refraction, of where the body is, or of its mesh;
-those with ``-64`` in a grid of 64 cells along a side in place of 32.
+those with ``-64`` in a grid of 64 cells along a side in place of 32. Traced rays meet up to 12 interfaces with 2 forks,
+whatever the planner of a version picks.
 """
 
 from __future__ import annotations
@@ -42,10 +43,12 @@ eye = [at + share * mesh.diagonal for at, share in zip(top, (0.25, 0.12, 0.55))]
 scene = tl.showcase(mesh, tl.Medium(ior=1.5), size, camera=tl.Camera.look_at(eye, top, fov_y=30.0))
 """
 
+#: Requested interfaces: what the planner picks differs from version to version.
 _FRAMES = """
-renderer = tl.Renderer()
+renderer, bends = tl.Renderer(), any(body.has_interface for body in scene.objects)
+interfaces = tl.TracedInterfaces(depth=12, forks=2) if bends else None
 def prepared():
-    return lambda: renderer.render(scene, size, samples=1)
+    return lambda: renderer.render(scene, size, samples=1, interfaces=interfaces)
 """
 
 _SOLVES = """
