@@ -132,7 +132,7 @@ SKY_RAYS = 2
 SUN = 16.0
 
 #: Pairs of a sample and a direction that are looked at at a time.
-_TOGETHER = 1 << 14
+_TOGETHER = 1 << 15
 
 #: Digits to which the stretch of a body is rounded, so that it does not depend on its rotation, and the least size of
 #: a body along one axis over that along another up to which this is done.
@@ -441,19 +441,25 @@ def _sky_rays(
     The pairs (l, r) are those from whose directions the rays come, for `shifts` (s,) from 0 to 1, and their fluxes are
     (l, r, 3).
     """
-    count = np.diff(first, append=len(received))
-    least, sums = np.minimum.reduceat(radiances, first, axis=1), np.zeros((3, len(received) + 1))
-    for channel, own, low in zip(sums, radiances, least, strict=True):
-        np.cumsum(received * (own - np.repeat(low, count)), out=channel[1:])
-    total = sums.sum(axis=0)
-    lit = np.flatnonzero(total[first + count] > total[first])
-    begin, end = first[lit, None], (first + count)[lit, None]
-    parts = np.arange(SKY_RAYS + 1) / SKY_RAYS
-    levels = total[begin] + (total[end] - total[begin]) * parts
-    flux = np.stack([np.diff(np.interp(levels, total, channel)) for channel in sums], axis=-1)
-    chosen = levels[:, :-1] + shifts[lit, None] * np.diff(levels)
-    pairs = np.clip(np.searchsorted(total, chosen, "right") - 1, begin, end - 1)
-    return (least * np.add.reduceat(received, first)).T, lit, pairs, flux
+    count, least = np.diff(first, append=len(received)), np.minimum.reduceat(radiances, first, axis=1)
+    total = np.zeros(len(received) + 1)
+    np.cumsum(received * (radiances.sum(axis=0) - np.repeat(least.sum(axis=0), count)), out=total[1:])
+    begin, end = first[:, None], (first + count)[:, None]
+    levels = total[begin] + (total[end] - total[begin]) * (np.arange(SKY_RAYS + 1) / SKY_RAYS)
+    chosen, between = levels[:, :-1] + shifts[:, None] * np.diff(levels), levels[:, 1:-1]
+    pairs = np.searchsorted(total, np.concatenate([chosen, between], axis=1), "right") - 1
+    pairs, cut = np.split(np.clip(pairs, begin, end - 1), [SKY_RAYS], axis=1)
+    # Sums from each pair that two rays share to the next; and the part of that pair that is the earlier ray's.
+    starts, given = np.concatenate([begin, cut], axis=1), np.stack([received, *(received * radiances)])
+    sums = np.add.reduceat(given, starts.ravel(), axis=1).reshape(4, *starts.shape)
+    sums[:, np.diff(starts, append=end) == 0] = 0.0
+    uniform = sums[0].sum(axis=1)
+    part = (between - total[cut]) / np.maximum(total[cut + 1] - total[cut], 1e-300) * given[:, cut]
+    sums[:, :, :-1] += part
+    sums[:, :, 1:] -= part
+    flux = np.maximum(sums[1:] - least[..., None] * sums[0], 0.0)
+    lit = np.flatnonzero(levels[:, -1] > levels[:, 0])
+    return (least * uniform).T, lit, pairs[lit], np.moveaxis(flux, 0, -1)[lit]
 
 
 def from_light(

@@ -90,14 +90,22 @@ class LateralShift:
         onward = [(weights * np.clip(place - number, 0.0, 1.0)).sum(axis=0) for number in range(MOST_SHIFTED)]
         return -np.diff([weights.sum(axis=0), *onward, np.zeros_like(self.level)], axis=0)
 
-    def moved(self, values: Array, samples: Integers) -> Array:
-        """(s, n): values (`MOST_SHIFTED` + 1, k, n) of rays at samples (k,), shifted by each number of steps."""
-        total = np.zeros((self.step.shape[0], values.shape[2]))
-        total[samples] = values[-1]
-        for own in values[-2::-1]:
+    def moved(self, values: Sequence[Array], samples: Integers) -> Array:
+        """(n, s): values of n quantities (`MOST_SHIFTED` + 1, k), shifted by each number of steps, at samples (k,)."""
+        columns = np.stack(values, axis=2)
+        total = np.zeros((self.step.shape[0], len(values)))
+        total[samples] = columns[-1]
+        for own in columns[-2::-1]:
             total = self.step @ total
             total[samples] += own
-        return total
+        return total.T
+
+
+def moved_along(values: Sequence[Array], samples: Integers, count: int, shift: LateralShift | None) -> Array:
+    """(n, count): sums of n quantities (k,) of rays at samples (k,), or of those (`MOST_SHIFTED` + 1, k) of a shift."""
+    if shift is not None:
+        return shift.moved(values, samples)
+    return np.stack([np.bincount(samples, value, count) for value in values])
 
 
 def _across(directions: Array, normals: Array) -> Array:

@@ -17,7 +17,7 @@ from scipy import sparse
 
 from translucent.arrays import Array, Floats, Integers
 from translucent.diffusion.densities import Densities
-from translucent.diffusion.entering_rays import EnteringRays, LateralShift
+from translucent.diffusion.entering_rays import EnteringRays, LateralShift, moved_along
 from translucent.diffusion.grid import BodyGrid, box_points
 from translucent.diffusion.walls import SlabSolution
 from translucent.formulas import optics
@@ -287,15 +287,14 @@ class Events:
         below = [(cell, factor * weight) for cell, weight in self.below]
         return replace(self, near=factor * self.near, above=factor * self.above, below=below)
 
-    def power(self, grid: BodyGrid, samples: Integers, flux: Array, above: Array | None = None) -> Array:
+    def power(self, grid: BodyGrid, samples: Integers | slice, flux: Array, above: Array | None = None) -> Array:
         """(cells,): scattered power in each cell for a flux (k,) that enters at samples (k,), in W.
 
-        `above` (s,) is what the cells receive from above the depth of reading; default: where it enters.
+        `above` (s,) is what the cells receive from above the depth of reading; default: of light at all samples, where
+        it enters.
         """
         flux = grid.areas[samples] * flux
-        if above is None:
-            above = np.asarray(np.bincount(samples, self.above * flux, len(grid.points)), np.float64)
-        total = np.asarray(grid.spreading @ above)
+        total = np.asarray(grid.spreading @ (self.above * flux if above is None else above))
         for cell, weight in self.below:
             total += np.bincount(cell, weight * flux, grid.count)
         return total
@@ -309,8 +308,6 @@ class ShiftedEvents:
     ----------
     flux : (s,) float64
         Flux that enters.
-    inverse, travel : (s,), (s, 3) float64
-        Sums of this flux over 1/2 and its cosine, and of it times its direction.
     near : (s,) float64
         Fluence at the surface; see `Events`.
     above : (s,) float64
@@ -318,15 +315,12 @@ class ShiftedEvents:
     """
 
     flux: Array
-    inverse: Array
-    travel: Array
     near: Array
     above: Array
 
     def plus(self, more: ShiftedEvents) -> ShiftedEvents:
         """Events of the rays of both."""
-        names = ("flux", "inverse", "travel", "near", "above")
-        return ShiftedEvents(*(getattr(self, name) + getattr(more, name) for name in names))
+        return ShiftedEvents(self.flux + more.flux, self.near + more.near, self.above + more.above)
 
 
 class FirstEvents:
@@ -406,23 +400,24 @@ class FirstEvents:
         reached = optics.transmittance(np.where(np.isfinite(paths.limit), extinction * paths.limit, np.inf))
         return Events(self._albedo * near / self._d - excess, self._albedo * above, deep, reached, counted, slab)
 
-    def shifted(self, paths: EntryPaths, events: Events, entering: Array, shift: LateralShift | None) -> ShiftedEvents:
-        """First events of rays that enter with a flux (k,), shifted along the surface if they come from one light."""
+    def shifted(
+        self, paths: EntryPaths, events: Events, entering: Array, shift: LateralShift | None
+    ) -> tuple[ShiftedEvents, Array]:
+        """First events of rays that enter with a flux (k,), shifted along the surface if they come from one light.
+
+        Also returns the flux as `moved_along` takes it.
+        """
         grid, layer, samples = self._grid, self._layer, paths.samples
-        cosine = np.broadcast_to(np.asarray(paths.cosine), samples.shape)
         # Where the medium is denser events are nearer.
         metres = np.where(layer.depth > 0.0, grid.below[1] / np.where(layer.depth > 0.0, layer.depth, 1.0), 0.0)
-        columns = [np.ones(len(samples)), 1.0 / (0.5 + cosine), *paths.directions.T, events.near, events.above]
-        values = entering[:, None] * np.stack(columns, axis=1)
-        if shift is None:
-            total = np.zeros((len(grid.points), len(columns)))
-            for of, part in zip(total.T, values.T, strict=True):
-                of[:] = np.bincount(samples, part, len(total))
-        else:
-            every, near, above = self._fractions(shift, samples, cosine, metres[samples])
-            total = shift.moved(np.stack([every] * 5 + [near, above], axis=2) * values, samples)
-        smooth = grid.smoothed(total[:, 5], float(np.mean(layer.lateral_variance * metres**2)))
-        return ShiftedEvents(total[:, 0], total[:, 1], total[:, 2:5], smooth, grid.areas * total[:, 6])
+        values = [entering, entering * events.near, entering * events.above]
+        if shift is not None:
+            cosine = np.broadcast_to(np.asarray(paths.cosine), samples.shape)
+            fractions = self._fractions(shift, samples, cosine, metres[samples])
+            values = [part * value for part, value in zip(fractions, values, strict=True)]
+        flux, near, above = moved_along(values, samples, len(grid.points), shift)
+        smooth = grid.smoothed(near, float(np.mean(layer.lateral_variance * metres**2)))
+        return ShiftedEvents(flux, smooth, grid.areas * above), values[0]
 
     def _fractions(
         self, shift: LateralShift, samples: Integers, cosine: Array, metres: Array

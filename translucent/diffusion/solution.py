@@ -22,10 +22,10 @@ from typing import Protocol
 import numpy as np
 from scipy import sparse
 
-from translucent.arrays import Array, Integers
+from translucent.arrays import Array
 from translucent.diffusion.cell_system import TOLERANCE, CellSystem
 from translucent.diffusion.densities import Densities, even_densities
-from translucent.diffusion.entering_rays import EnteringRays, LateralShift
+from translucent.diffusion.entering_rays import EnteringRays, LateralShift, moved_along
 from translucent.diffusion.first_events import (
     EntryPaths,
     FirstEvents,
@@ -177,7 +177,7 @@ class BodySystem:
         warm_starts: bool = False,
     ) -> None:
         self._warm_starts, self._ior = warm_starts, medium.ior
-        self._arriving: OrderedDict[Hashable, dict[int, _DirectionalEffects]] = OrderedDict()
+        self._arriving: OrderedDict[Hashable, tuple[dict[int, _DirectionalEffects], Array]] = OrderedDict()
         self._emitted = 4.0 * np.pi * np.asarray(medium.emission)
         reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
         self._grid, self._dense = grid, dense or even_densities(grid)
@@ -244,12 +244,11 @@ class BodySystem:
         straights = [
             kept(self._arriving, ray, partial(self._directional, ray), most) for ray in rays if len(ray.samples)
         ]
-        directed, inverse, along = np.zeros(len(flux)), np.zeros(len(flux)), np.zeros_like(flux)
+        directed, incidence = np.zeros(len(flux)), sum((sums for _, sums in straights), np.zeros((4, len(flux))))
         for channel, system in self._channels.items():
             emission = float(self._emitted[channel])
-            straight = reduce(_DirectionalEffects.plus, (each[channel] for each in straights), system.nothing)
-            directed, inverse = directed + straight.first.flux, inverse + straight.first.inverse
-            along = along + straight.first.travel
+            straight = reduce(_DirectionalEffects.plus, (each[channel] for each, _ in straights), system.nothing)
+            directed = directed + straight.first.flux
             found = system.solved(
                 entering[:, channel],
                 None if returned is None else partial(returned, channel=channel),
@@ -266,23 +265,29 @@ class BodySystem:
             scattered[:, channel] = system.scattered
             steps += taken
         total = flux.sum(axis=1)
-        cosine, travel = _mean_cosine(total, directed, inverse), _mean_direction(total, directed, along, normals)
+        cosine = _mean_cosine(total, directed, incidence[0])
+        travel = _mean_direction(total, directed, incidence[1:].T, normals)
         return DiffuseSolution(fluence, flux, cells, inclusions, cosine, travel, leaving, passing, scattered, steps)
 
-    def _directional(self, ray: EnteringRays) -> dict[int, _DirectionalEffects]:
-        """Effects of rays that enter, by channel."""
+    def _directional(self, ray: EnteringRays) -> tuple[dict[int, _DirectionalEffects], Array]:
+        """Effects of rays that enter, by channel.
+
+        And sums (4, s), over the channels, of the flux over 1/2 and its cosine, and of it times its direction.
+        """
         path = entry_paths(ray, self._grid, self._dense)
         shift = LateralShift.of(self._grid, ray, self._ior) if ray.from_one else None
-        return {
-            channel: system.directional(ray.entering[:, channel], ray.mirrored[:, channel], path, shift)
-            for channel, system in self._channels.items()
-        }
+        effects, flux = dict[int, _DirectionalEffects](), np.zeros(())
+        for channel, system in self._channels.items():
+            found = system.directional(ray.entering[:, channel], ray.mirrored[:, channel], path, shift)
+            effects[channel], flux = found[0], flux + found[1]
+        columns = [flux / (0.5 + path.cosine), *(flux * along for along in path.directions.T)]
+        return effects, moved_along(columns, path.samples, len(self._grid.points), shift)
 
 
 def _mean_cosine(flux: Array, directed: Array, inverse: Array) -> Array:
     """(s,): mean cosine of the light that enters, with which 1 / (mu + m) is the mean of all light, at mu = 1/2.
 
-    The part `directed` (s,) of the flux (s,) has an `inverse` (s,) as in `ShiftedEvents`, and the rest is uniform.
+    The part `directed` (s,) of the flux (s,), over 1/2 and its cosine, is `inverse` (s,); the rest is uniform.
     """
     rest = np.maximum(flux - directed, 0.0)
     total = np.maximum(rest + directed, np.finfo(np.float64).tiny)
@@ -358,7 +363,7 @@ class _ChannelSystem:
         self._walls = walls
         slab = SlabSolution(walls, ior, absorption, scattering, phase) if walls.any else None
         self._first = FirstEvents(grid, layer, ior, absorption, scattering, phase, chord, slab)
-        diffuse, self._paths, self._all = self._first.of(paths), paths, paths.samples
+        diffuse, self._paths = self._first.of(paths), paths
         # Cells that the surface cuts count a little too many events, or too few. The lengths of paths say how many: at
         # edges, where many leave the body on another side, and in all.
         around = np.maximum(diffuse.counted[grid.nearest].mean(axis=1), _TINY)
@@ -401,7 +406,7 @@ class _ChannelSystem:
         source = self._power(even)
         cells, _ = self._cells.solved(source, self._cells.even(source), ROUGH)
         found = (self._read @ cells) * self._attenuated + self._diffuse.near
-        found = self._exit_fraction * self._with_walls(found, self._in_walls(self._diffuse.slab, self._all))
+        found = self._exit_fraction * self._with_walls(found, self._in_walls(*self._diffuse.slab))
         surface = np.clip((1.0 - self.through) / np.maximum(found, _TINY), LEAST_CORRECTION, MOST_CORRECTION)
         # Few paths reach each sample of an inclusion: all of them count together.
         reaching = self._inclusions.reaching(self._grid, self._paths, self._diffuse.reached * even)
@@ -409,9 +414,8 @@ class _ChannelSystem:
         solved = self._inclusions.area * float(self._inclusions.diffuse(cells, reaching).sum())
         return np.asarray(surface), min(max(rest / max(solved, _TINY), LEAST_CORRECTION), MOST_CORRECTION)
 
-    def _in_walls(self, slab: tuple[Array, Array], samples: Integers) -> Array:
-        """(s,): fluence in thin walls by light at samples (k,), on the same side and across."""
-        own, other = (np.bincount(samples, part, len(self._grid.points)) for part in slab)
+    def _in_walls(self, own: Array, other: Array) -> Array:
+        """(s,): fluence in thin walls by light at the samples (s,), of their own side and of the other one."""
         return np.asarray(own + self._walls.area * other[self._walls.across])
 
     def _with_walls(self, fluence: Array, slab: Array) -> Array:
@@ -471,22 +475,31 @@ class _ChannelSystem:
     @cached_property
     def nothing(self) -> _DirectionalEffects:
         """Effects of no rays."""
-        none, travel = np.zeros(len(self._grid.points)), np.zeros((len(self._grid.points), 3))
-        first = ShiftedEvents(none, none, travel, none, none)
-        return _DirectionalEffects(first, none, none, np.zeros(self._grid.count), np.zeros(len(self._inclusions.lost)))
+        none = np.zeros(len(self._grid.points))
+        return _DirectionalEffects(
+            ShiftedEvents(none, none, none),
+            none,
+            none,
+            np.zeros(self._grid.count),
+            np.zeros(len(self._inclusions.lost)),
+        )
 
     def directional(
         self, entering: Array, mirrored: Array, paths: EntryPaths, shift: LateralShift | None
-    ) -> _DirectionalEffects:
-        """Effects of rays that enter with a flux (k,), and are reflected with another: first events on their paths."""
+    ) -> tuple[_DirectionalEffects, Array]:
+        """Effects of rays that enter with a flux (k,), and are reflected with another: first events on their paths.
+
+        Also returns the flux, see `FirstEvents.shifted`.
+        """
         events = self._first.of(paths)
-        first = self._first.shifted(paths, events, entering, shift)
+        first, flux = self._first.shifted(paths, events, entering, shift)
         power = events.power(self._grid, paths.samples, entering, first.above)
         reaching = self._inclusions.reaching(self._grid, paths, events.reached * entering)
         power = power + self._inclusions.sent(reaching)
-        slab = self._in_walls((events.slab[0] * entering, events.slab[1] * entering), paths.samples)
-        reflected = np.asarray(np.bincount(paths.samples, mirrored, len(self._grid.points)), np.float64)
-        return _DirectionalEffects(first, reflected, slab, power, reaching)
+        count = len(self._grid.points)
+        own, other = (np.bincount(paths.samples, part * entering, count).astype(np.float64) for part in events.slab)
+        reflected = np.asarray(np.bincount(paths.samples, mirrored, count), np.float64)
+        return _DirectionalEffects(first, reflected, self._in_walls(own, other), power, reaching), flux
 
     def at_inclusions(self, cells: Array, flux: Array, straight: _DirectionalEffects) -> Array:
         """Irradiance at the samples of inclusions (i,), for what `solved` finds."""
@@ -501,7 +514,7 @@ class _ChannelSystem:
 
     def _power(self, flux: Array) -> Array:
         """(cells,): power that uniform light with a flux (s,) adds by scattering and internal reflection."""
-        power = self._diffuse.power(self._grid, self._all, flux)
+        power = self._diffuse.power(self._grid, slice(None), flux)
         if self._grid.inclusions is None:
             return power
         reaching = self._inclusions.reaching(self._grid, self._paths, self._diffuse.reached * flux)
@@ -538,9 +551,7 @@ class _ChannelSystem:
             fluence = (self._read @ cells) * self._attenuated + self._diffuse.near * flux + straight.first.near
             if walls:
                 own, across = self._diffuse.slab
-                fluence = self._with_walls(
-                    fluence, self._in_walls((own * flux, across * flux), self._all) + straight.slab
-                )
+                fluence = self._with_walls(fluence, self._in_walls(own * flux, across * flux) + straight.slab)
             return np.asarray(np.maximum(fluence, 0.0) * correction + emitted)
 
         def leaving(fluence: Array, flux: Array) -> Array:

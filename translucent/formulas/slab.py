@@ -77,23 +77,27 @@ def slab_fluxes(albedo: float, ior: float, phase: PhaseFunction = ISOTROPIC) -> 
     mirrored = optics.fresnel_dielectric(cosine, 1.0 / ior) if ior > 1.0 else np.zeros_like(cosine)
     leaves = cosine * weight * (1.0 - mirrored)
     depths = 2.0 ** (np.arange(_LEAST * _BETWEEN, _MOST * _BETWEEN + 1) / _BETWEEN)
-    own, across = np.zeros((2, len(depths), len(cosine)))
-    for chain in range(_BETWEEN):
-        depth = 2.0 ** (_START + chain / _BETWEEN)
-        # A layer so thin that light is scattered no more than once.
-        turned, kept = _phases(cosine, (moments[:-1] - peak) / (1.0 - peak))
-        back, on = (0.5 * scattered * depth * part * weight / cosine[:, None] for part in (turned, kept))
-        on = on + np.diag(1.0 - extinction * depth / cosine)
-        for power in range(_START, _MOST + 1):
-            number = (power - _LEAST) * _BETWEEN + chain
-            if 0 <= number < len(depths):
-                straight = np.diag(optics.transmittance(depths[number] / cosine))
-                whole = _between_interfaces(back, on, mirrored, leaves)
-                unscattered = _between_interfaces(np.zeros_like(back), straight, mirrored, leaves)
-                for found, every, some in zip((own, across), whole, unscattered, strict=True):
-                    found[number] = np.maximum(every - some, 0.0) / (cosine * weight)
-            again = np.linalg.inv(np.eye(len(cosine)) - back @ back)
-            back, on = back + on @ again @ back @ on, on @ again @ on
+    # Layers so thin that light is scattered no more than once; each is doubled.
+    depth = depths[:_BETWEEN, None, None] * 2.0 ** (_START - _LEAST)
+    turned, kept = _phases(cosine, (moments[:-1] - peak) / (1.0 - peak))
+    back, on = (0.5 * scattered * depth * part * weight / cosine[:, None] for part in (turned, kept))
+    one = np.eye(len(cosine))
+    on = on + one * (1.0 - extinction * depth / cosine)
+    layers = []
+    for _ in range(_START, _MOST + 1):
+        layers.append((back, on))
+        between = on @ np.linalg.inv(one - back @ back)
+        back, on = back + between @ back @ on, between @ on
+    backs, ons = (np.concatenate(part)[: len(depths)] for part in zip(*layers[_LEAST - _START :], strict=True))
+    straight = optics.transmittance(depths[:, None] / cosine)
+    fluxes = []
+    # Light from both sides at once, alike or opposite, meets one mirror only.
+    for sign in (1.0, -1.0):
+        matrix = backs + sign * ons
+        every = np.linalg.solve(one - np.swapaxes(matrix, 1, 2) * mirrored[:, None], leaves[:, None])
+        unscattered = leaves / (1.0 - sign * straight * mirrored) * sign * straight
+        fluxes.append((np.swapaxes(every, 1, 2) @ matrix)[:, 0] - unscattered)
+    own, across = (np.maximum(0.5 * (fluxes[0] + sign * fluxes[1]), 0.0) / (cosine * weight) for sign in (1.0, -1.0))
     return SlabFluxes(depths, cosine, own, across, leaves / leaves.sum())
 
 
@@ -103,17 +107,6 @@ def _phases(cosine: Array, moments: Array) -> tuple[Array, Array]:
     values = np.polynomial.legendre.legvander(cosine, len(moments) - 1)
     weighted = values * (2 * order + 1) * moments
     return (weighted * (-1.0) ** order) @ values.T, weighted @ values.T
-
-
-def _between_interfaces(back: Array, on: Array, mirrored: Array, leaves: Array) -> tuple[Array, Array]:
-    """Flux that leaves on the same side and on the other side, (n,) each, for downward radiance at each cosine.
-
-    Light from both sides at once, alike or opposite, meets one mirror only.
-    """
-    one, found = np.eye(len(leaves)), []
-    for matrix in (back + on, back - on):
-        found.append((np.linalg.solve((one - matrix * mirrored).T, leaves)) @ matrix)
-    return 0.5 * (found[0] + found[1]), 0.5 * (found[0] - found[1])
 
 
 #: Cosines of slabs on a card, on each side of the critical one. With twice as many, results change by less than 1e-3.
