@@ -1,5 +1,5 @@
 // The step of a photon of a light to the next surface (Jensen 1996, "Global illumination using photon maps"). Interfaces reflect or
-// refract it by chance as a path of light; what media absorb on the path is exact. It lands on the first opaque surface, if an
+// refract it, a part of the photons each; what media absorb on the path is exact. It lands on the first opaque surface, if an
 // interface has refracted or reflected it: all others are straight light. Needs <constants>, <View>, <Surfaces> and <ObjectRow>.
 
 #include "lib/light.glsl"
@@ -15,6 +15,8 @@
 #include "transport/sampled_branch.glsl"
 
 uniform uint aim;            // its number: a light, and a rectangle
+uniform uint round_begin;    // number of the first photon of this aim in one picture,
+uniform float round_photons; // and how many these are
 uniform vec2 aim_shift;      // where the sequence of starts begins
 uniform vec4 light_from;     // position from the center of the media, w = 1; or direction of travel, w = 0
 uniform vec4 cone;           // in which a light shines
@@ -33,6 +35,7 @@ struct Photon {
     float skipped;     // metres before its origin: from the surface, which it must not hit again
     vec3 direction;
     vec3 throughput;   // fraction of its power that is left
+    float choice;      // number from 0 to 1 by which it takes the next branch
     uvec4 interior;
     bool bent;         // refracted or reflected
     bool ends;
@@ -42,6 +45,13 @@ struct Photon {
 vec2 start_of(uint number) {
     vec2 start = vec2(uvec2(number * 3242174889u, number * 2447445414u) >> 8u) / 16777216.0;
     return fract(start + aim_shift);
+}
+
+// Number from 0 to 1 that rises with the numbers of a picture's photons. Photons that take the same branches have numbers one after
+// the other, and so starts as even as those of all. If chance chose, light through a pane would have holes where its faces reflect
+// photons.
+float choice_of(uint number) {
+    return min((float(number - round_begin) + 0.5) / round_photons, ALMOST_ONE);
 }
 
 // Number of the photon's channel of light, whose indices of refraction count.
@@ -58,7 +68,7 @@ Photon begun(uint number, inout Draws draws, out vec3 power) {
     vec2 start = start_of(number);
     vec3 light_at = light_from.xyz;
     if (light_radius > 0.0) { light_at += light_radius * sphere_point(random_numbers(draws).xyz); }
-    Photon photon = Photon(light_at, 0.0, light_from.xyz, vec3(1.0), light_interior, false, false);
+    Photon photon = Photon(light_at, 0.0, light_from.xyz, vec3(1.0), choice_of(number), light_interior, false, false);
     power = photon_power;
 #if DISPERSION
     power *= 3.0 * vec3(equal(ivec3(channel_of(number)), ivec3(0, 1, 2)));
@@ -84,7 +94,7 @@ Photon begun(uint number, inout Draws draws, out vec3 power) {
     return photon;
 }
 
-// The interaction of a photon with an interface: one branch, by chance.
+// The interaction of a photon with an interface: one branch.
 void interact(inout Photon photon, SurfaceHit surface, ObjectRow body, int before, int after, int channel, inout Draws draws) {
     vec3 normal = facing_normal(surface.smooth_normal, photon.direction);
     vec3 point = photon.origin + surface.path * photon.direction;
@@ -92,7 +102,7 @@ void interact(inout Photon photon, SurfaceHit surface, ObjectRow body, int befor
     vec4 numbers = random_numbers(draws);
     vec3 emitted;
     vec3 light_density;
-    Branch next = sampled_branch(at, body, polished_lobes(at, body, emitted), photon.throughput, numbers.x, vec3(0.0), draws, light_density);
+    Branch next = sampled_branch(at, body, polished_lobes(at, body, emitted), photon.throughput, photon.choice, vec3(0.0), draws, light_density);
     photon.throughput *= next.weight;
     if (next.transmitted) { photon.interior = surface.interior; }
     photon.bent = photon.bent || !next.transmitted || (!at.thin_walled && at.ior != 1.0);

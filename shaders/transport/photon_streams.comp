@@ -36,10 +36,11 @@ void store(int place, Photon photon, vec3 power, Draws draws) {
     put(9, place, power);
     put(12, place, floatBitsToUint(photon.skipped));
     put(13, place, draws.count | (photon.bent ? BENT : 0u));
+    put(14, place, floatBitsToUint(photon.choice));
 #if ONE_OBJECT
-    put(14, place, packed_interior(photon.interior));
+    put(15, place, packed_interior(photon.interior));
 #else
-    for (int word = 0; word < 4; ++word) { put(14 + word, place, photon.interior[word]); }
+    for (int word = 0; word < 4; ++word) { put(15 + word, place, photon.interior[word]); }
 #endif
 }
 
@@ -48,11 +49,11 @@ Photon stored_photon(int place, out vec3 power, inout Draws draws) {
     draws.count = counted & ~BENT;
     power = taken_vector(9, place);
     Photon photon = Photon(taken_vector(0, place), uintBitsToFloat(taken(12, place)), taken_vector(3, place), taken_vector(6, place),
-        uvec4(0u), (counted & BENT) != 0u, false);
+        uintBitsToFloat(taken(14, place)), uvec4(0u), (counted & BENT) != 0u, false);
 #if ONE_OBJECT
-    photon.interior = unpacked_interior(taken(14, place));
+    photon.interior = unpacked_interior(taken(15, place));
 #else
-    for (int word = 0; word < 4; ++word) { photon.interior[word] = taken(14 + word, place); }
+    for (int word = 0; word < 4; ++word) { photon.interior[word] = taken(15 + word, place); }
 #endif
     return photon;
 }

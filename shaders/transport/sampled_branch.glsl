@@ -1,6 +1,8 @@
 // Branches of random paths and photons at interfaces: one, chosen by chance. Needs interaction.glsl, microfacets.glsl and random.glsl.
 // ROUGH: some body is.
 
+const float ALMOST_ONE = 1.0 - 1.0 / 16777216.0;
+
 struct Branch {
     vec3 direction;
     vec3 weight;       // factor of the throughput
@@ -35,9 +37,16 @@ Lobes polished_lobes(Interaction at, ObjectRow body, out vec3 emitted) {
     return lobes;
 }
 
+// Chooses by a number from 0 to 1 with a chance. The number is then spread from 0 to 1 again, for the next choice.
+bool chooses(inout float number, float chance) {
+    bool chosen = number < chance;
+    number = min(chosen ? number / chance : (number - chance) / (1.0 - chance), ALMOST_ONE);
+    return chosen;
+}
+
 // A branch by a random number, as likely as the light that it carries. to_light: for rough interfaces, and light_density:
 // density in 1/sr with which they scatter light there.
-Branch sampled_branch(Interaction at, ObjectRow body, Lobes lobes, vec3 throughput, float number, vec3 to_light, inout Draws draws,
+Branch sampled_branch(Interaction at, ObjectRow body, Lobes lobes, vec3 throughput, inout float number, vec3 to_light, inout Draws draws,
     out vec3 light_density) {
     Branch branch;
     branch.lost = false;
@@ -45,7 +54,7 @@ Branch sampled_branch(Interaction at, ObjectRow body, Lobes lobes, vec3 throughp
     light_density = vec3(0.0);
     vec3 passing = passing_base(at);
 #if ROUGH
-    if (is_rough(at) && number < coat_at(at, body)) {
+    if (is_rough(at) && chooses(number, coat_at(at, body))) {
         branch.transmitted = false;
         branch.weight = vec3(1.0);
         branch.on_base = vec3(0.0);
@@ -68,7 +77,7 @@ Branch sampled_branch(Interaction at, ObjectRow body, Lobes lobes, vec3 throughp
         branch.on_base = lobes.transmission;
         float back = dot(throughput, lobes.reflection);
         float chance = back / max(back + dot(throughput, on), 1e-30);
-        branch.transmitted = number >= chance;
+        branch.transmitted = !chooses(number, chance);
         branch.weight = branch.transmitted ? on / (1.0 - chance) : lobes.reflection / max(chance, 1e-30);
         branch.direction = !branch.transmitted ? reflected_direction(at.direction, at.normal)
             : at.thin_walled ? at.direction : refracted_direction(at.direction, at.normal, at.ior);

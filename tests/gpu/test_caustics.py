@@ -144,6 +144,7 @@ PLATE = tl.Object(Box((-2.5, 0.0, -2.5), (0.9, 0.05, 0.6)).tessellate(), color=(
 #: Reflects a fifth to a third of the light.
 FILM_AND_COAT = tl.Surface(iridescence=1.0, iridescence_ior=2.4, iridescence_thickness=1.2e-7, clearcoat=1.0)
 #: Balls over a ground, and how far off the energy may be: with a plate in the light, pixels at its edges show one side.
+#: And the pixels: the reference's few photons of a rough ball alone are 0.18 to 0.33 off by other seeds.
 PAIRS = {
     "ball and core": (
         scene(
@@ -155,21 +156,23 @@ PAIRS = {
             overlap="priority",
         ),
         0.05,
+        0.2,
     ),
-    "film and coat": (scene(ball(CLEAR, mesh=COARSE, surface=FILM_AND_COAT), GROUND, light=SUN), 0.01),
+    "film and coat": (scene(ball(CLEAR, mesh=COARSE, surface=FILM_AND_COAT), GROUND, light=SUN), 0.01, 0.2),
     "rough film and coat": (
         scene(ball(TINTED, mesh=COARSE, surface=replace(FILM_AND_COAT, roughness=0.4)), GROUND, light=LAMP),
         0.01,
+        0.3,
     ),
-    "sphere light": (scene(ball(CLEAR, mesh=COARSE), GROUND, light=tl.SphereLight((1.5, 6, 1), 20.0, 0.6)), 0.01),
-    "dispersive": (scene(ball(CLEAR, mesh=COARSE, surface=tl.Surface(dispersion=2.0)), GROUND, light=SUN), 0.01),
+    "sphere light": (scene(ball(CLEAR, mesh=COARSE), GROUND, light=tl.SphereLight((1.5, 6, 1), 20.0, 0.6)), 0.01, 0.2),
+    "dispersive": (scene(ball(CLEAR, mesh=COARSE, surface=tl.Surface(dispersion=2.0)), GROUND, light=SUN), 0.01, 0.2),
 }
 
 
 @pytest.mark.parametrize("name", PAIRS)
 def test_the_irradiance_is_that_of_the_reference(name: str, renderer: tl.Renderer) -> None:
     """In a picture from beneath the ball: energy, and pixels."""
-    one, tolerance = PAIRS[name]
+    one, tolerance, most = PAIRS[name]
     camera, size = tl.Camera.look_at((0.5, 1.2, 3.5), (-0.4, 0, 0), fov_y=40), (48, 32)
     one = tl.Scene(one.objects, camera, one.lights, NIGHT, one.overlap)
     found = photons_in(renderer, one, size, tl.Caustics(30_000))
@@ -180,7 +183,7 @@ def test_the_irradiance_is_that_of_the_reference(name: str, renderer: tl.Rendere
     share = found.sum(axis=(0, 1)) / (0.5 * (a + b)).sum(axis=(0, 1))
     np.testing.assert_allclose(share, 1.0, atol=tolerance + noise)
     a, b, found = blurred(a), blurred(b), blurred(found)
-    assert np.sqrt(max(((found - a) * (found - b)).mean(), 0.0)) / (0.5 * (a + b).mean()) < 0.2
+    assert np.sqrt(max(((found - a) * (found - b)).mean(), 0.0)) / (0.5 * (a + b).mean()) < most
 
 
 #: Bodies that share places: one in another, both on the ground and on a plate; a pane beside them, whose back is open.
@@ -253,12 +256,13 @@ def test_a_focus_is_as_sharp_as_its_photons(renderer: tl.Renderer, landed: Lande
 
 
 def test_even_light_is_even(renderer: tl.Renderer) -> None:
-    """Through a flat window, which hardly mirrors: without width photons vary twice as much as the bar."""
-    window = tl.Object(Box((-1, 1, -1), (1, 1.2, 1)).tessellate(), tl.Medium(ior=1.02))
+    """Through a flat window: photons without width vary twice as much as the bar, mirrored by chance half as much again."""
+    window = tl.Object(Box((-1, 1, -1), (1, 1.2, 1)).tessellate(), tl.Medium(ior=1.9))
     one = scene(window, GROUND, light=tl.DirectionalLight((0.1, -1, 0.06), 1.0), camera=top())
     middle = photons_in(renderer, one, (60, 60), tl.Caustics(5000))[20:40, 20:40, 0]  # 5.6 of a pixel
-    assert middle.mean() == pytest.approx(1.0 / np.sqrt(1.0136), rel=0.03)
-    assert middle.std() < 0.1 * middle.mean()
+    mirrored = (0.9 / 2.9) ** 2  # by each face
+    assert middle.mean() == pytest.approx((1.0 - mirrored) / (1.0 + mirrored) / np.sqrt(1.0136), rel=0.005)
+    assert middle.std() < 0.11 * middle.mean()
 
 
 def test_the_ground_shows_what_lands_on_it(renderer: tl.Renderer, landed: Landed) -> None:
@@ -390,14 +394,14 @@ def test_sky_shadows_are_those_of_straight_light(renderer: tl.Renderer) -> None:
     assert renderer.render(dark, (16, 12)).radiance.min() < 0.8 * straight.min()
 
 
-def test_photons_are_the_same_however_many_follow(renderer: tl.Renderer, landed: Landed) -> None:
-    """The first ones of many are those of few; another seed has others."""
+def test_photons_are_the_same_each_time(renderer: tl.Renderer, landed: Landed) -> None:
+    """The first ones of many start where those of few do, and most land there; another seed has others."""
     one = scene()
     for caustics in (tl.Caustics(600), tl.Caustics(600), tl.Caustics(1500), tl.Caustics(600, seed=1)):
         renderer.render(one, (8, 8), caustics=caustics)
     few, again, many, other = (part[:600, :4] for part in landed.parts)
     np.testing.assert_array_equal(few, again)
-    np.testing.assert_array_equal(few, many)
+    assert (few == many).all(axis=1).mean() > 0.7  # others choose the next branch
     assert (few != other).any()
 
 

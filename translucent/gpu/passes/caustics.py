@@ -50,7 +50,7 @@ BATCH = PHOTON_WIDTH * 512
 _STEP = np.array([3242174889, 2447445414]) / 2.0**32
 
 #: Bytes that are kept of a photon, by the names of the buffers.
-_BYTES = {"photons": 72, "live_photons": 12, "photon_segments": 24}
+_BYTES = {"photons": 76, "live_photons": 12, "photon_segments": 24}
 
 #: Largest distance of surfaces that a ray hits in one place, as a fraction of the scene, with room for rounding; see
 #: ``path_within`` of ``shaders/transport/surface_hit.glsl``.
@@ -118,7 +118,7 @@ class CausticsPass:
 
     def follow(self, job: FrameJob, tracer: PhotonTracer, number: int, begin: int, end: int) -> None:
         """Follow some photons of one aim, and add them to the pixels of the opaque points that they land on."""
-        values = _aim_values(tracer.aims[number], number, job)
+        values = {**_aim_values(tracer.aims[number], number, job), "round_begin": begin, "round_photons": end - begin}
         for first in range(begin, end, BATCH):
             count = min(BATCH, end - first)
             self._photons.bind(**tracer.textures)
