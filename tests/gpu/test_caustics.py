@@ -256,7 +256,7 @@ def test_a_focus_is_as_sharp_as_its_photons(renderer: tl.Renderer, landed: Lande
 
 
 def test_even_light_is_even(renderer: tl.Renderer) -> None:
-    """Through a flat window: photons without width vary twice as much as the bar, mirrored by chance half as much again."""
+    """Through a flat window: photons without width vary twice as much as the bar, by chance half as much again."""
     window = tl.Object(Box((-1, 1, -1), (1, 1.2, 1)).tessellate(), tl.Medium(ior=1.9))
     one = scene(window, GROUND, light=tl.DirectionalLight((0.1, -1, 0.06), 1.0), camera=top())
     middle = photons_in(renderer, one, (60, 60), tl.Caustics(5000))[20:40, 20:40, 0]  # 5.6 of a pixel
