@@ -9,9 +9,11 @@ import importlib
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError, ThreadPoolExecutor
+from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
+from functools import cache
 from types import FrameType
 from typing import Any, TypeVar
 
@@ -112,3 +114,34 @@ def end_if_stopped() -> None:
     ended = _ended.get(None)
     if ended is not None and ended.is_set():
         raise CancelledError
+
+
+@cache
+def _blas() -> Any:
+    """Controller of the BLAS that NumPy has loaded, and SciPy if it has: looking for it takes milliseconds."""
+    from threadpoolctl import ThreadpoolController  # late: most commands multiply no matrices
+
+    return ThreadpoolController().select(user_api="blas")
+
+
+#: The `one_blas_thread` that have begun and not ended, and the lock that guards them.
+_limited, _limiting = list[Any](), threading.Lock()
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Context within which products of matrices use one thread of the processor, in the whole process.
+
+    For a millisecond's work more threads gain nothing, and then wait in busy loops for longer than it took. Contexts
+    may be nested, and overlap in several threads: the number of threads is restored at the end of the last one.
+    """
+    with _limiting:
+        _limited.append(None if _limited else _blas().limit(limits=1))
+    try:
+        yield
+    finally:
+        with _limiting:
+            limit = _limited[0]
+            _limited.pop()
+            if not _limited:
+                limit.restore_original_limits()

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy import sparse
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import translucent as tl
 from translucent.diffusion import field
-from translucent.diffusion.cell_system import MOST, TOLERANCE, KnownSolutions, conjugate_gradients
+from translucent.diffusion.cell_system import MOST, TOLERANCE, KnownSolutions
 from translucent.diffusion.entering_rays import EnteringRays, LateralShift
 from translucent.diffusion.field import DiffusingBody
 from translucent.diffusion.grid import body_grid
@@ -19,6 +20,7 @@ from translucent.diffusion.solution import BodySystem
 from translucent.diffusion.volume import DiffusingVolume, VolumeGrid
 from translucent.geometry.solids import Sphere
 from translucent.planning.scattering import Diffusion
+from translucent.threads import one_blas_thread
 
 MILK = tl.Medium(absorption=0.1, scattering=20.0, ior=1.33)
 
@@ -41,15 +43,22 @@ def test_mixed_lights_take_no_steps() -> None:
     assert max(steps[2:]) <= 3
 
 
-def test_conjugate_gradients_solve() -> None:
-    values = np.random.default_rng(1).normal(size=(30, 30))
-    matrix, right_side = sparse.csr_array(values @ values.T + np.eye(30)), values[0]
-    found, steps = conjugate_gradients(matrix, right_side, values[1], lambda residual: residual, 1e-10)
-    np.testing.assert_allclose(matrix @ found, right_side, atol=1e-9)
-    assert 2 < steps <= 90
-    assert conjugate_gradients(matrix, right_side, found, lambda residual: residual, 1e-6)[1] == 0
-    found, steps = conjugate_gradients(matrix, 0.0 * right_side, values[1], lambda residual: residual, 1e-6)
-    assert (steps, np.abs(found).max()) == (0, 0.0)
+def test_solutions_use_one_thread_of_a_blas_which_gets_its_others_back() -> None:
+    """Contexts that overlap, as of two threads: the first to begin is the first to end."""
+
+    def threads() -> set[int]:
+        return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+    with threadpool_limits(2):
+        first, second = one_blas_thread(), one_blas_thread()
+        assert threads() == {2}
+        first.__enter__()
+        second.__enter__()
+        assert threads() == {1}
+        first.__exit__(None, None, None)
+        assert threads() == {1}
+        second.__exit__(None, None, None)
+        assert threads() == {2}
 
 
 def test_solutions_depend_on_earlier_ones_only_with_warm_starts() -> None:

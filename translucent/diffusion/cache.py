@@ -46,6 +46,7 @@ from translucent.planning.rendered import Treatment, treatment_of
 from translucent.planning.scattering import Diffusion
 from translucent.scene.grounds import ground_below
 from translucent.scene.scene import Object, Scene
+from translucent.threads import one_blas_thread
 
 #: Bodies, and lit scenes, that are kept.
 KEPT_BODIES, KEPT_SCENES = 16, 4
@@ -143,7 +144,7 @@ class FieldCache:
             maps = irradiance_maps(scene, plan.exchanging) if plan.exchanging else {}
             return Fields(surfaces, volumes, ground, maps)
 
-        with self._lock:
+        with self._lock, one_blas_thread():
             return kept(self._scenes, key, make, KEPT_SCENES)
 
     def keep(self, plan: RenderPlan, fields: Fields) -> None:

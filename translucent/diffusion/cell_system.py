@@ -8,11 +8,11 @@ Nicolaides 1987, "Deflation of conjugate gradients with applications to boundary
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from itertools import count
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import LinearOperator, cg
 
 from translucent.arrays import Array
 from translucent.diffusion.grid import BodyGrid
@@ -120,62 +120,39 @@ class CellSystem:
         self._known = KnownSolutions(self._matrix)
 
     def _found(self, right_side: Array, near: Array, tolerance: float) -> tuple[Array, int]:
-        found, steps = conjugate_gradients(self._matrix, right_side, near, self._approximate_inverse, tolerance)
-        if steps > MOST_STEPS:
+        steps = count()
+        found, failed = cg(
+            self._matrix,
+            right_side,
+            near,
+            rtol=tolerance,
+            maxiter=MOST_STEPS,
+            M=self._approximate_inverse,
+            callback=lambda _: next(steps),
+        )
+        if failed:
             raise RenderError(
                 "diffusion in a body",
                 f"the diffusion solver has not converged after {MOST_STEPS} steps in {len(right_side)} cells",
                 "render with scattering=tl.ScatteringLayer()",
             )
-        return found, steps
+        return found, next(steps)
 
 
-def conjugate_gradients(
-    matrix: sparse.csr_array,
-    right_side: Array,
-    start: Array,
-    approximate_inverse: Callable[[Array], Array],
-    tolerance: float,
-) -> tuple[Array, int]:
-    """Solve a symmetric, positive definite system (n, n) from a start (n,); also returns the number of steps.
-
-    It ends at a residual of `tolerance` times the right-hand side (n,), or after more than `MOST_STEPS` steps. Scalar
-    products are sums: past 10,000 numbers those of a BLAS are found by threads that then wait in busy loops, for longer
-    than the rest of a step takes.
-    """
-    found, residual = start.copy(), right_side - matrix @ start
-    if (enough := tolerance**2 * float((right_side**2).sum())) == 0.0:
-        return np.zeros_like(start), 0
-    direction, before = np.zeros_like(start), np.inf
-    for steps in range(MOST_STEPS + 1):
-        if float((residual**2).sum()) <= enough:
-            return found, steps
-        step = approximate_inverse(residual)
-        product = float((residual * step).sum())
-        direction = step + product / before * direction
-        before, pushed = product, matrix @ direction
-        length = product / float((direction * pushed).sum())
-        found += length * direction
-        residual -= length * pushed
-    return found, MOST_STEPS + 1
-
-
-def _approximate_inverse(grid: BodyGrid, matrix: sparse.csr_array) -> Callable[[Array], Array]:
+def _approximate_inverse(grid: BodyGrid, matrix: sparse.csr_array) -> LinearOperator:
     """Preconditioner of a system: its diagonal, and a coarse correction that is constant in each block of cells.
 
     Errors that single cells see vanish in a few steps of conjugate gradients, and those as wide as the body in many:
     with the second part they need no more than others (Nicolaides 1987).
     """
-    of, count = grid.blocks, int(grid.blocks.max(initial=-1)) + 1
-    between = np.bincount(grid.block_pairs, matrix.data, count * count).reshape(count, count)
-    # No dense inverse: the threads of a BLAS would wait in busy loops for longer than it takes.
-    coarse = splu(sparse.csc_array(between), "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    of, blocks = grid.blocks, int(grid.blocks.max(initial=-1)) + 1
+    coarse = np.linalg.inv(np.bincount(grid.block_pairs, matrix.data, blocks * blocks).reshape(blocks, blocks))
     diagonal = 1.0 / matrix.data[grid.pattern.diagonal]
 
     def apply(right_side: Array) -> Array:
-        return np.asarray(diagonal * right_side + coarse.solve(np.bincount(of, right_side, count))[of])
+        return np.asarray(diagonal * right_side + (coarse @ np.bincount(of, right_side, blocks))[of])
 
-    return apply
+    return LinearOperator(matrix.shape, apply, dtype=np.float64)
 
 
 def _balance(grid: BodyGrid, d: Array, absorbed: Array, lost: Array) -> Array:

@@ -247,6 +247,11 @@ class Sky:
     facing: Integers
     other: Integers
 
+    @cached_property
+    def first(self) -> Integers:
+        """(l,): first pair of each sample that has some."""
+        return np.flatnonzero(np.diff(self.sample, prepend=-1))
+
 
 def sky_of(grid: BodyGrid) -> Sky:
     """Trace rays from each sample of a surface for the directions in which it sees the sky."""
@@ -290,8 +295,7 @@ def environment_parts(
         power, rest = _map_power(environment)
         texels = _turned_texels(environment)
         towards = directions if turn is None else directions @ turn.T
-        # Not a product of matrices: the threads of BLAS would wait in busy loops for longer than the search takes.
-        nearest = np.asarray(cKDTree(towards).query(texels)[1])
+        nearest = np.asarray((texels.astype(np.float32) @ towards.T.astype(np.float32)).argmax(axis=1))
         radiance = power if suns else rest
     return np.stack([np.bincount(nearest, radiance[:, channel], len(directions)) for channel in range(3)], axis=1)
 
@@ -417,7 +421,7 @@ def sky_light(
         Flux that the surface mirrors, as if it was diffuse, for a unit of what enters.
     """
     entering, rays = np.zeros((len(normals), 3)), []
-    first, shifts = np.flatnonzero(np.diff(sky.sample, prepend=-1)), other_plane_points(len(normals))[:, 0]
+    first, shifts = sky.first, other_plane_points(len(normals))[:, 0]
     ends = np.append(first[1:], len(received))
     for of in np.array_split(np.arange(len(first)), len(received) // _TOGETHER + 1):
         pairs = slice(first[of[0]], ends[of[-1]]) if len(of) else slice(0, 0)

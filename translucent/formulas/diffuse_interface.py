@@ -19,6 +19,7 @@ import numpy.typing as npt
 from translucent.arrays import Array
 from translucent.formulas import interface, optics
 from translucent.formulas.phase import ISOTROPIC, PhaseFunction
+from translucent.threads import one_blas_thread
 
 #: Even and odd Legendre moments.
 _PARTS = slice(0, None, 2), slice(1, None, 2)
@@ -197,6 +198,7 @@ def half_space_reflectances(
 
 
 @lru_cache(maxsize=1024)
+@one_blas_thread()
 def _half_space(albedo: float, ior: float, phase: PhaseFunction) -> tuple[Array, Array, Array]:
     """Quadrature over cosines inside the medium: cosines, fluxes, and reflectances of the interface.
 
@@ -213,21 +215,8 @@ def _half_space(albedo: float, ior: float, phase: PhaseFunction) -> tuple[Array,
         bare = bare_half_space(albedo, phase, cosine, weight, 2 * MODE_NODES)
     mirrored, flux = _inside_reflectance(cosine, ior), cosine * weight
     # The transposed system: what leaves for each radiance that goes up for the first time.
-    leaving = _solved_in_halves((np.eye(len(cosine)) - bare * mirrored).T, flux * (1.0 - mirrored))
+    leaving = np.linalg.solve((np.eye(len(cosine)) - bare * mirrored).T, flux * (1.0 - mirrored))
     return cosine, flux, (leaving @ bare) / flux
-
-
-def _solved_in_halves(matrix: Array, right_side: Array) -> Array:
-    """Solution (n,) of a linear system (n, n), by its Schur complement.
-
-    LAPACK solves larger systems by threads, which wait for each other in busy loops for longer than that takes.
-    """
-    first, second = slice(None, len(matrix) // 2), slice(len(matrix) // 2, None)
-    beside = np.linalg.solve(matrix[first, first], matrix[first, second])
-    alone = np.linalg.solve(matrix[first, first], right_side[first])
-    rest = matrix[second, second] - matrix[second, first] @ beside
-    last = np.linalg.solve(rest, right_side[second] - matrix[second, first] @ alone)
-    return np.concatenate([alone - beside @ last, last])
 
 
 def _chandrasekhar_h(albedo: float, cosine: Array, weight: Array) -> Array:
@@ -239,9 +228,8 @@ def _chandrasekhar_h(albedo: float, cosine: Array, weight: Array) -> Array:
     kernel = 0.5 * albedo * cosine * weight / (cosine[:, None] + cosine)
     for _ in range(H_STEPS):
         # Halfway by ratio: the equation alone turns what is too large by a factor into what is too small by it, which
-        # would go on for ever where nothing is absorbed. So errors are at least halved. No product of matrices: the
-        # threads of a BLAS would cost more than they gain.
-        better = np.sqrt(h / (np.sqrt(1.0 - albedo) + (kernel * h).sum(axis=1)))
+        # would go on for ever where nothing is absorbed. So errors are at least halved.
+        better = np.sqrt(h / (np.sqrt(1.0 - albedo) + kernel @ h))
         done = np.abs(better - h).max() < H_TOLERANCE
         h = better
         if done:
