@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 
 import numpy as np
@@ -9,11 +10,15 @@ import pytest
 
 import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
+from translucent.geometry.solids import Box, Sphere
 from translucent.gpu import refinement
+from translucent.gpu.renderer import read_paths
+from translucent.gpu.viewport import Viewport
 from translucent.preview.actions import OrbitBy, SetField
 from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.worker import Pool
 from translucent.preview.workspace import Workspace
+from translucent.scene.camera import Lens
 
 
 @pytest.fixture
@@ -83,6 +88,46 @@ def test_what_paths_cannot_follow_stays_as_it_is_and_says_so(view: ViewportRende
     body = scene.objects[0]
     hole = tl.Mesh(body.mesh.vertices, body.mesh.faces[1:])
     broken = tl.Scene([tl.Object(hole, body.medium)], scene.camera, environment=scene.environment)
-    more, changed = view.paths.step(broken, view.renderer, view.viewport, 1.0, work)
+    more, changed = view.paths.step(broken, view.renderer, view.viewport, 1.0, work, None)
     assert (more, changed) == (False, False)
     assert "not converging: PathTraced of" in view.paths.note
+
+
+def test_paths_and_photons_are_out_of_focus_where_frames_are(view: ViewportRenderer) -> None:
+    """Means over one lens; of a pinhole they are further than from each other."""
+    size, lens, count = (32, 16), Lens(1.0, 3.0), 16
+    ink = tl.Object(Sphere().tessellate(16), tl.Medium((0.4, 0.8, 1.2)))
+    floor = tl.Object(Box((-4.0, -1.2, -4.0), (4.0, -1.1, 4.0)).tessellate(), color=(0.7, 0.7, 0.7))
+    camera = tl.Camera.look_at((0, 3, 6), (0, -0.5, 0))
+    dark = tl.Scene([ink], camera, environment=tl.Environment.studio())
+    glass = dataclasses.replace(ink, medium=tl.Medium((0.1, 0.2, 0.4), ior=1.5))
+    lit = tl.Scene([glass, floor], camera, [tl.DirectionalLight((0.4, -1.0, 0.2), 3.0)])
+
+    def through(scene: tl.Scene, number: int) -> tl.Scene:
+        return dataclasses.replace(scene, camera=lens.camera(scene.camera, size, number, count))
+
+    def off(one: np.ndarray, other: np.ndarray) -> float:
+        return float(np.sqrt(np.square(one - other, dtype=np.float64).mean()) / other.mean())
+
+    with view.current():
+        renderer, engine = view.renderer, view.renderer.gpu
+        sharp = renderer.render(dark, size, samples=4).radiance
+        soft = np.mean([renderer.render(through(dark, i), size, samples=4).radiance for i in range(count)], axis=0)
+        paths = refinement.Convergence(engine, renderer.plan(dark, tl.PathTraced(2)), size, lens)
+        while paths.paths < 32 * refinement.LENS_PATHS:
+            paths.step(1.0)
+        seen = read_paths(paths.job)[0]
+        paths.release()
+        assert off(seen, soft) < 0.4 * off(sharp, soft)
+
+        viewport, photons = Viewport(engine), tl.Caustics(1 << 12)
+        viewport.resize(size)
+        plan = renderer.plan(lit, caustics=photons)
+        for _ in range(1 + count):
+            viewport.step(0, plan, 1, count, lens=lens)
+        seeds = [dataclasses.replace(photons, seed=i) for i in range(1 + count)]
+        views = [lit, *(through(lit, i) for i in range(count))]
+        pictures = zip(views, seeds, strict=True)
+        soft = np.mean([renderer.render(one, size, samples=1, caustics=by).radiance for one, by in pictures], axis=0)
+        sharp = renderer.render(lit, size, samples=4, caustics=photons).radiance
+        assert off(viewport.radiance(0), soft) < 0.5 * off(sharp, soft)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Generator
 from contextlib import ExitStack
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from translucent.gpu.renderer import GpuRenderer
 from translucent.gpu.targets import Targets
 from translucent.planning.passes import PassName
 from translucent.planning.render_plan import RenderPlan
+from translucent.scene.camera import Lens
 
 #: Largest number of rounds that are followed at once.
 MOST_ROUNDS = 256
@@ -109,6 +111,9 @@ class PhotonPicture:
 #: Paths of each pixel after which a picture is done, and most of them between two pictures.
 MOST_PATHS, MOST_PATHS_AT_ONCE = 4096, 16
 
+#: Paths of each pixel through a point of a lens, and those points.
+LENS_PATHS, LENS_POINTS = 4, 256
+
 #: Noise of the picture, as a fraction of its mean radiance, at which it is done, too.
 QUIET = 1e-3
 
@@ -126,29 +131,45 @@ class Convergence:
     plan : RenderPlan
         With random paths.
     size : (width, height)
+    lens : Lens, optional
+        Each round has paths through another point of it.
 
     Attributes
     ----------
     job : FrameJob
-        Whose `picture` shows the paths of the last round.
+        Of the last round, whose `picture` shows the paths of the last round.
     paths : int
         Of each pixel, in that picture.
     error : float
         Root mean square of its standard error, divided by its mean radiance.
     """
 
-    def __init__(self, engine: GpuRenderer, plan: RenderPlan, size: tuple[int, int]) -> None:
-        self._engine = engine
+    def __init__(self, engine: GpuRenderer, plan: RenderPlan, size: tuple[int, int], lens: Lens | None = None) -> None:
+        self._engine, self._size, self._lens = engine, size, lens
         self.plan = plan
         self.paths, self.error = 0, np.inf
         self._tile = SOFTWARE_TILE if "software" in engine.context.renderer else TILE
         self._round: Generator[Progress, None, None] | None = None
-        self.job: FrameJob = engine.prepare(plan, size)
+        self.job: FrameJob = self._placed()
+
+    def _placed(self) -> FrameJob:
+        """Job with all but the paths, from the pinhole or the next point of the lens."""
+        plan = self.plan
+        if self._lens is not None:
+            # Numbers with their binary digits reversed: any first points are spread over the whole lens.
+            point = int(f"{self.paths // LENS_PATHS % LENS_POINTS:08b}"[::-1], 2)
+            camera = self._lens.camera(plan.scene.camera, self._size, point, LENS_POINTS)
+            plan = replace(plan, scene=replace(plan.scene, camera=camera))
+        job = self._engine.prepare(plan, self._size)
+        job.paths_traced = self.paths
         try:
-            engine.run(self.job, leave_out=(PassName.PATH_TRACE,))
+            self._engine.run(job, leave_out=(PassName.PATH_TRACE,))
+            if self.paths:
+                self._engine.paths.show(job)
         except BaseException:
-            self.job.release()
+            job.release()
             raise
+        return job
 
     @property
     def done(self) -> bool:
@@ -161,6 +182,11 @@ class Convergence:
         while True:
             if self._round is None:
                 last = min(max(2 * self.paths, 2), self.paths + MOST_PATHS_AT_ONCE)
+                if self._lens is not None:
+                    last = self.paths + LENS_PATHS
+                    if self.paths:
+                        self.job.release()
+                        self.job = self._placed()
                 self._round = self._engine.paths.steps(
                     self.job, last, spread=True, seconds=0.5 * seconds, tile=self._tile
                 )

@@ -310,7 +310,7 @@ class Viewport:
         """Draw the next sample of a side, of `samples` a pixel besides its center; a picture has one stride.
 
         Light of `photons`, as a picture of the viewport's size has it, takes the place of those of a plan. All samples
-        but the first are through points of a lens, if there is one.
+        but the first are through points of a lens, if there is one; each of those has photons of its own.
         """
         chosen = self._side(side, self.size)
         chosen.stride = stride
@@ -322,6 +322,8 @@ class Viewport:
         if lens is not None and round_:
             camera = lens.camera(plan.scene.camera, size, (round_ - 1) % samples, samples)
             plan = replace(plan, scene=replace(plan.scene, camera=camera))
+            if plan.caustics is not None:
+                plan, photons = replace(plan, caustics=replace(plan.caustics, seed=round_)), None
         job = engine.prepare(plan, size)
         if photons is not None:
             job.photon_light = photons, stride, phase

@@ -126,6 +126,8 @@ def _through_lens(renderer: Renderer, scene: Scene, size: Size, request: RenderR
         window = camera.window or Window(0, 0, size)
         shifted = replace(window, left=window.left + float(right), top=window.top + float(down))
         view = replace(scene, camera=replace(camera, window=shifted))
+        if one.caustics is not None:
+            one = replace(one, caustics=replace(one.caustics, seed=number))
         found = renderer.render_requested(view, size, one)
         for name, values in sums.items():
             values += getattr(found, name)

@@ -30,6 +30,7 @@ from translucent.preview.tasks import Task
 from translucent.preview.worker import Pool, Urgency
 from translucent.preview.workspace import Workspace
 from translucent.renderer import Renderer
+from translucent.scene.camera import Lens
 from translucent.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -377,7 +378,13 @@ class PathRefinement:
         self._made: tuple[int, Floats] | None = None  # paths and radiance of the next one
 
     def step(
-        self, scene: Scene, renderer: Renderer, viewport: Viewport, seconds: float, workspace: Workspace
+        self,
+        scene: Scene,
+        renderer: Renderer,
+        viewport: Viewport,
+        seconds: float,
+        workspace: Workspace,
+        lens: Lens | None,
     ) -> tuple[bool, bool]:
         """Follow paths of a still picture for about so many seconds; whether more are to come, and it has changed.
 
@@ -391,7 +398,7 @@ class PathRefinement:
             if self.plan is None:
                 return False, False
             if self._held is None:
-                self._held = Convergence(renderer.gpu, self.plan, viewport.size)
+                self._held = Convergence(renderer.gpu, self.plan, viewport.size, lens)
                 self.note = "tracing the first paths"
                 return True, False
         except InputError as error:
@@ -581,18 +588,18 @@ class PhotonRefinement:
         """True if more photons would change nothing to be seen."""
         return not self.drawing and (self._in_picture >= MOST_PHOTONS or self._noise < QUIET)
 
-    def take_over(self, viewport: Viewport, stride: int, samples: int) -> bool:
+    def take_over(self, viewport: Viewport, stride: int, samples: int, *, through_lens: bool) -> bool:
         """Replace the visible picture by the one drawn in the background, once it is complete; returns whether it did.
 
         Where pictures take long, the first whole one takes over, and edges become smooth after that. When it is as good
-        as it gets with these photons, more are followed.
+        as it gets with these photons, more are followed; not through a lens, whose points have photons of their own.
         """
         assert self.light is not None
         drawn, whole, last = viewport.steps(self.side), stride * stride, stride * stride * (1 + samples)
         if over := self.side == 1 and drawn == (whole if stride > 1 else last):
             viewport.swap()
             self.side, self._on_show = 0, True
-            self._in_picture = self._in_texture
+            self._in_picture = MOST_PHOTONS if through_lens else self._in_texture
             mean = viewport.mean_radiance()
             self._noise = self.light.error / mean if mean > 0 else 0.0
         if drawn >= last:

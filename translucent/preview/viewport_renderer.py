@@ -236,7 +236,7 @@ class ViewportRenderer:
         more = drawn or alone or workspace.relights
         self.idle = more and not (drawn or alone or lit)
         if display.converges and still and not more:
-            more, drawn = self.paths.step(scene, self.renderer, self.viewport, self._left, workspace)
+            more, drawn = self.paths.step(scene, self.renderer, self.viewport, self._left, workspace, self._lens)
         if lit:
             more, drawn = self._light_by_photons(scene, workspace)
             if self.photons.light is None and not more:  # there are no photons to follow
@@ -303,10 +303,11 @@ class ViewportRenderer:
         if photons.side == 1 and not self.viewport.steps(1):
             strides[1] = self._times.stride(photons.plan, self._left)
         stride, begun = strides[photons.side], time.perf_counter()
-        samples = samples_of(stride, workspace.document.display.antialias)
-        self.viewport.step(photons.side, photons.plan, stride, max(samples, 1), photons=photons.light.texture)
+        samples = samples_of(stride, workspace.document.display.antialias) if self._lens is None else LENS_SAMPLES
+        light = photons.light.texture
+        self.viewport.step(photons.side, photons.plan, stride, max(samples, 1), photons=light, lens=self._lens)
         self._finish(0, photons.plan, stride, begun)
-        if photons.take_over(self.viewport, stride, samples):
+        if photons.take_over(self.viewport, stride, samples, through_lens=self._lens is not None):
             strides[0], self.plans[0] = stride, photons.plan
         return True, photons.side == 0
 
