@@ -12,8 +12,9 @@ import translucent as tl
 import translucent.gpu.renderer as renderer_module
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu import adaptive
-from translucent.gpu.adaptive import isolated_pixels, wanted_samples
+from translucent.gpu.adaptive import isolated_pixels, uneven_part, wanted_samples
 from translucent.gpu.job import FrameJob
+from translucent.gpu.placement import Part
 from translucent.gpu.targets import read_floats
 
 Floats = npt.NDArray[np.float32]
@@ -183,6 +184,20 @@ def test_isolated_pixels_are_found_and_edges_are_not() -> None:
     inside[19, 20] = False
     found = {(int(row), int(column)) for row, column in np.argwhere(isolated_pixels(level, inside))}
     assert found == {(4, 5), (15, 8), (12, 25)}
+    # One of them is known too well for that to be chance.
+    error = np.where(np.arange(32) < 20, 0.05, np.inf).astype(np.float32) * np.ones((24, 1), np.float32)
+    found = {(int(row), int(column)) for row, column in np.argwhere(isolated_pixels(level, inside, error))}
+    assert found == {(12, 25)}
+
+
+def test_light_is_uneven_beside_edges_alone() -> None:
+    rows, columns = np.mgrid[0:40, 0:60].astype(np.float32)
+    light = np.repeat((1.0 + 0.02 * columns + 0.01 * rows)[..., None], 3, axis=-1)
+    assert not uneven_part(light, 0.01)
+    light[10:20, 30:33] *= 0.5
+    assert uneven_part(light, 0.01) == Part(28, 8, 35, 22)
+    light[0] = 9.0  # an edge of the picture
+    assert uneven_part(light, 0.01) == Part(0, 0, 60, 22)
 
 
 def test_no_pixel_of_frosted_glass_is_far_off_its_neighbors(

@@ -11,12 +11,13 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from translucent.formulas.color import LUMINANCE_WEIGHTS
 from translucent.formulas.sampling import sample_shifts, sobol_points
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.caustics import ROUNDS, ROUNDS_FROM
 from translucent.gpu.passes.opaque import is_smooth
 from translucent.gpu.passes.ray_generations import pixel_words
-from translucent.gpu.passes.traced_interfaces import FEW_SAMPLES, interior_at_eye, mirrored_part
+from translucent.gpu.passes.traced_interfaces import FEW_SAMPLES, interior_at_eye, mirrored_part, unsettled_part
 from translucent.gpu.passes.variants import Variants
 from translucent.gpu.placement import Part
 from translucent.gpu.shaders import set_uniform, set_used
@@ -51,6 +52,10 @@ APART = 2.0
 #: of the 24 around it, and from each of the eight by a fraction of that; and the least spread, as a fraction of the
 #: median. Isolated pixels have at most so many samples, in those of the picture.
 ISOLATED, ALONE, LEAST_SPREAD, MOST_AGAIN = 3.0, 0.4, 0.015, 8
+
+#: Standard errors up to which noise explains how far a pixel is off: of a normal distribution, all but one of 370 are
+#: within, and means of skewed ones are further off only with samples that make their errors as large.
+BY_CHANCE = 3.0
 
 #: Samples from which those of the first look are chosen.
 _CHOICE = 32
@@ -154,18 +159,23 @@ class AdaptiveSampling:
         for number, shift in enumerate((shifts - shifts.mean(axis=0)).tolist(), first):
             if (number - first) % samples == 0:
                 # What is still there after as many samples again is a thing of the scene.
-                before, left = left, self._mark_isolated(job)
+                before, left = left, self._mark_isolated(job, samples)
                 if left in (0, before):
                     break
             self._trace_sample(job, number, shift, run_passes, leave_out)
 
-    def _mark_isolated(self, job: FrameJob) -> int:
+    def _mark_isolated(self, job: FrameJob, samples: int) -> int:
         """Mark the isolated pixels that show interfaces alone; returns how many there are."""
         light, beside = (read_floats(job.targets[name], 0, 4) for name in ("bent", "average"))
         taken = light[..., 3]
         inside = (taken > 0) & (beside[..., 3] == 0)
         level = light[..., :3].sum(axis=-1) / np.where(inside, taken, 1.0)
-        found = isolated_pixels(level, inside)
+        mean = light[..., :3] @ np.array(LUMINANCE_WEIGHTS, np.float32)
+        # Few samples may go wrong together: their deviation tells nothing.
+        known = inside & (taken >= samples) & (mean > 0.0)
+        shares = read_floats(job.targets["bent"], 1, 4)[..., 0] / np.square(np.where(known, mean, 1.0))
+        error = np.where(known, level * np.sqrt(np.maximum(shares - 1.0 / np.where(known, taken, 1.0), 0.0)), np.inf)
+        found = isolated_pixels(level, inside, error)
         for name in ("unsettled", "mirror_unsettled"):
             if name == "unsettled" or job.mirror is not None:
                 job.targets[name].clear()
@@ -174,34 +184,44 @@ class AdaptiveSampling:
         return int(found.sum())
 
     def _hold_opaque(self, job: FrameJob, shifts: Sequence[tuple[float, float]], run_passes: Run) -> None:
-        """Draw the opaque objects in a few samples, whose mean all samples then show."""
+        """Draw the opaque objects in a few samples, whose mean all samples then show.
+
+        After the first, only where their light is not linear from pixel to pixel: at edges of shadows and of surfaces.
+        """
         job.few_opaque = True
         others = tuple(step.name for step in job.plan.passes if step.name not in _OF_OPAQUE)
-        for job.sample in ROUNDS:
+        mean = job.targets["opaque_mean"]
+        for number, job.sample in enumerate(ROUNDS):
             job.place(shifts[job.sample])
             run_passes(others)
-            self._add_opaque(job, len(ROUNDS))
-        self._part.bind(sampled=job.targets["opaque_mean"].color_attachments[0])
+            if number == 0:
+                self._add_opaque(job, 1)
+                job.uneven = uneven_part(read_floats(mean, 0, 4)[..., :3], DIFFERENCE_TO_ERROR * MIRROR_ERROR)
+                mean.clear(viewport=job.uneven.scissor)
+            self._add_opaque(job, len(ROUNDS), job.uneven)
+        self._part.bind(sampled=mean.color_attachments[0])
         job.targets.view("opaque", 1).use()
         self._gl.enable_only(moderngl.NOTHING)
         self._part.draw_fullscreen(self._part.program(HELD=True))
         job.holds_opaque = True
 
-    def _add_opaque(self, job: FrameJob, samples: int) -> None:
+    def _add_opaque(self, job: FrameJob, samples: int, part: Part | None = None) -> None:
+        """Add a sample of the opaque objects to their mean, in all of the picture or in a part."""
         self._part.bind(sampled=job.targets["opaque"].color_attachments[1])
         program = self._part.program(HELD=False)
         set_uniform(program, "part", 1.0 / samples)
-        job.targets["opaque_mean"].use()
         add_up(self._gl)
-        self._part.draw_fullscreen(program)
+        whole = Part(0, 0, *job.targets.size)
+        self._part.draw_part(whole if part is None else part, program, job.targets["opaque_mean"])
 
     def _find_unsettled(self, job: FrameJob, samples: int, taken: int) -> int:
         """Mark the pixels that need more samples than these; returns how many there are."""
         if not job.covered:
             return 0
-        marked = [(("bent", "unsettled"), ERROR, MUCH_LOST, Part(0, 0, *job.targets.size))]
+        covered = job.covered.flipped(job.targets.size[1]).wider(1, job.targets.size)  # of samples a pixel apart
+        marked = [(("bent", "unsettled"), ERROR, MUCH_LOST, unsettled_part(job, covered, "unsettled"))]
         if job.mirror is not None:
-            part = mirrored_part(job, job.mirror)
+            part = unsettled_part(job, mirrored_part(job, job.mirror), "mirror_unsettled")
             marked.append((("mirrored", "mirror_unsettled"), MIRROR_ERROR, MIRROR_LOST, part))
         finer = min(16.0 / samples, 1.0)
         values = {"samples": samples, "most": _most(samples), "first": taken == 1, "apart": APART}
@@ -253,8 +273,28 @@ def wanted_samples(deviations: Floats, samples: int) -> float:
     return float(samples * ((found**0.8).sum() / np.square(found).sum()) ** (2 / 3))
 
 
-def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """(h, w): pixels of a picture (h, w) far off their neighbors, if these all are `inside` (h, w)."""
+def uneven_part(light: Floats, difference: float) -> Part:
+    """Bounds of the pixels beside which light (h, w, 3) has a second difference of more than this fraction of it."""
+    level = light.sum(axis=-1)
+    bends = np.zeros(level.shape, bool)
+    for before, here, after, found in (
+        (level[:-2], level[1:-1], level[2:], bends[1:-1]),
+        (level[:, :-2], level[:, 1:-1], level[:, 2:], bends[:, 1:-1]),
+    ):
+        found |= np.abs(before + after - 2.0 * here) > difference * here
+    rows, columns = (np.flatnonzero(bends.any(axis=axis)) for axis in (1, 0))
+    if not rows.size:
+        return Part(0, 0, 0, 0)
+    # A sample aside of the first sees what is up to a pixel further on.
+    bounds = Part(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
+    return bounds.wider(1, (level.shape[1], level.shape[0]))
+
+
+def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_], error: Floats | None = None) -> npt.NDArray[np.bool_]:
+    """(h, w): pixels of a picture (h, w) far off their neighbors, if these all are `inside` (h, w).
+
+    Where the standard error (h, w) is known, only those that noise explains: others are things of the scene.
+    """
     found, (height, width) = np.zeros(level.shape, bool), level.shape
     steps = [(y, x) for y in range(-2, 3) for x in range(-2, 3) if (y, x) != (0, 0)]
     padded = np.pad(inside, 1)
@@ -271,6 +311,8 @@ def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_]) -> npt.NDArray
     spread = 1.4826 * np.median(np.abs(wide - np.median(wide, axis=0)), axis=0)
     distance = np.abs(own - median)
     far = (distance > ISOLATED * np.maximum(spread, LEAST_SPREAD * np.abs(median))) & (off > ALONE * distance)
+    if error is not None:
+        far &= distance <= BY_CHANCE * error[row, column]
     found[row[far], column[far]] = True
     return found
 

@@ -30,6 +30,7 @@ from translucent.gpu.light_cameras import media_sphere
 from translucent.gpu.placement import (
     Balance,
     FaceCounts,
+    Part,
     PlacedScene,
     SampleView,
     depth_range,
@@ -249,6 +250,8 @@ class FrameJob(CameraView):
         Of a job that is bending: pixels that need more samples, by the name of their target.
     few_opaque : bool
         Opaque objects are shaded in a few samples, before all others, which show the mean of these.
+    uneven : Part, optional
+        Pixels in which the rest of these samples are shaded, rows up; the light of others is there.
     holds_opaque : bool
         That mean is there.
     has_blurs : bool
@@ -265,6 +268,7 @@ class FrameJob(CameraView):
     corner: tuple[int, int] = (0, 0)
     for_map = path_only = two_media = projected_depth = bent_apart = bending = any_eye = False
     few_opaque = holds_opaque = has_blurs = False
+    uneven: Part | None = None
     photon_light: tuple[moderngl.Texture, int, tuple[int, int]] | None = None
 
     def __init__(

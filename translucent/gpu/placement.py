@@ -202,6 +202,11 @@ class Part:
         """This rectangle with its rows counted from the top of a picture of this height."""
         return Part(self.left, height - self.top, self.right, height - self.bottom)
 
+    def wider(self, pixels: int, size: tuple[int, int]) -> Part:
+        """This rectangle with so many pixels more on each side, within a picture of a size."""
+        left, bottom = max(self.left - pixels, 0), max(self.bottom - pixels, 0)
+        return Part(left, bottom, min(self.right + pixels, size[0]), min(self.top + pixels, size[1]))
+
     def rows(self, first: int, last: int) -> Part:
         """The part of its rows from `first` on that are before `last`."""
         return Part(self.left, max(self.bottom, first), self.right, min(self.top, last))

@@ -101,10 +101,13 @@ class CausticsPass:
             for i, aim in enumerate(tracer.aims):
                 begin, end = (aim.photons * (number + j) // len(rounds) for j in range(2))
                 self.follow(job, tracer, i, begin, end)
-        if job.few_opaque and number < len(rounds) - 1:
-            return None  # where the ground is smooth, the last of them shows all photons
-        self.draw_base(job, spec.objects)
-        return self.shade(job, job.targets.view("opaque", 1))
+        if not job.few_opaque:
+            self.draw_base(job, spec.objects)
+            return self.shade(job, job.targets.view("opaque", 1))
+        if number == len(rounds) - 1:  # where the ground is smooth, the last of them shows all photons
+            self.draw_base(job, spec.objects)
+            self.shade(job, job.targets["opaque_mean"], len(rounds))
+        return None
 
     def begin(self, stack: ExitStack, job: FrameJob, *, again: bool = False) -> PhotonTracer:
         """Prepare photon tracing in the scene of a job, and clear landed photons, unless more are added to them."""

@@ -72,6 +72,13 @@ class OpaquePass:
             self.draw_depth(job, spec.objects, ends)
             return
         framebuffer = job.targets["opaque"]
+        if job.uneven is not None:
+            ends = job.targets.opaque_ends()
+            ends.clear(float(CONSTANTS["NOTHING"]), depth=1.0)
+            self.draw_depth(job, spec.objects, ends)
+            if not job.uneven:
+                return
+            framebuffer.scissor = job.uneven.scissor
         framebuffer.use()
         _clear(framebuffer)
         job.gl.enable_only(moderngl.DEPTH_TEST)
@@ -117,6 +124,7 @@ class OpaquePass:
                 set_used(program, {"opaque_map": light.map_uniform(i, media_center(job.scene))})
             job.draw(program, (i,))
         job.gl.depth_func = "<"
+        framebuffer.scissor = None
 
     def draw_depth(
         self, view: CameraView, objects: tuple[int, ...], framebuffer: moderngl.Framebuffer, *, projected: bool = False

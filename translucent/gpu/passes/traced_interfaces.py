@@ -155,7 +155,7 @@ class TracedInterfacesPass:
         Of a job that is bending, only those in the target of the name `mask`.
         """
         by_generations = job.plan.hits == "embree"
-        part = _unsettled_part(job, part, mask)
+        part = unsettled_part(job, part, mask)
         variants = self._with_sums if by_generations else self._variants
         rows = max(MOST_LIGHT // job.targets.size[0], 1) if by_generations else part.scissor[3]
         for row in range(part.bottom, part.top, max(rows, 1)):
@@ -175,7 +175,7 @@ class TracedInterfacesPass:
         job.gl.depth_func = "1"
         entered = job.targets["entered"].color_attachments[0]
         for mask, name, whole in marked:
-            part = _unsettled_part(job, whole, mask)
+            part = unsettled_part(job, whole, mask)
             self._where_unsettled.bind(entered=entered, unsettled=job.targets[mask].color_attachments[0])
             program = self._where_unsettled.program(MIRROR=name == "mirrored")
             self._where_unsettled.draw_part(part, program, job.targets[name])
@@ -200,7 +200,7 @@ def _pixels(job: FrameJob, part: Part, mask: str) -> Pixels:
     return words[within]
 
 
-def _unsettled_part(job: FrameJob, part: Part, mask: str) -> Part:
+def unsettled_part(job: FrameJob, part: Part, mask: str) -> Part:
     """Bounds of the unsettled pixels of a mask within a part; the whole part if these pixels are not listed."""
     if not job.bending or mask not in job.unsettled:
         return part
