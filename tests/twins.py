@@ -170,10 +170,11 @@ def _first_event_arguments(count: int) -> list[np.ndarray]:
 
 
 def _ahead_arguments() -> list[np.ndarray]:
-    """Optical depths, fractions of events ahead, g, and cosines."""
+    """Optical depths, fractions of events ahead, g, cosines, and fractions that stay."""
     grids = [0, 1e-3, 0.5, 3, 30, 1e4], [0.0, 0.3, 0.9], [0.05, 0.4, 0.9, 0.98], [-1.0, 0.0, 0.75, 1.0]
     depth, ahead, anisotropy, cosine = _mixed(*map(np.array, grids))
-    return [_triples(depth), np.repeat(ahead[:, None], 3, axis=1), anisotropy, cosine]
+    staying = np.resize(np.float32([1.0, 0.0, 0.4]), len(depth))
+    return [_triples(depth), np.repeat(ahead[:, None], 3, axis=1), anisotropy, cosine, staying]
 
 
 def _ahead_mirrored_arguments() -> list[np.ndarray]:
@@ -370,6 +371,8 @@ ARGUMENTS = {
     "emergent_radiance": _emergent_arguments(),
     "first_events_excess": _first_event_arguments(1),
     "mean_first_events_excess": _first_event_arguments(2),
+    "staying_fraction": _mixed(np.array([0.0, 0.1, 0.7, 1.0]), np.array([0.05, 0.4, 0.9, 0.98])),
+    "last_event_fraction": [np.array([0.0, 1e-4, 0.03, 0.1, 1.0, 10.0, 80.0, 1e4], np.float32)],
     "scattered_ahead": _ahead_arguments(),
     "ahead_mirrored": _ahead_mirrored_arguments(),
     "real_harmonics": [np.concatenate([_unit_vectors(), np.eye(3, dtype=np.float32), -np.eye(3, dtype=np.float32)])],
@@ -407,6 +410,7 @@ ROUNDINGS = dict.fromkeys(ARGUMENTS, 16.0) | {
     "tone_agx": 64.0,  # powers
 }
 FLOOR = {
+    "last_event_fraction": 1e-4,  # difference of inverse depths
     "ahead_mirrored": 1e-3,  # drivers find angles to 4e-4
     "scattered_ahead": 2e-5,  # differences of moments of order 0
     "first_events_excess": 1e-5,  # less 1

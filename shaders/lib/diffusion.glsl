@@ -35,9 +35,21 @@ vec3 mean_first_events_excess(vec4 phase, vec3 scale, float down, float up) {
     return sum / float(AZIMUTHS);
 }
 
+// Mean distance of the last scattering event from where a ray leaves a body, as a fraction of its path with an optical depth.
+float last_event_fraction(float optical_depth) {
+    float depth = max(optical_depth, LEAST_EVENT_DEPTH);
+    return 1.0 / depth + 1.0 - 1.0 / opacity(vec3(depth)).x;
+}
+
+// Fraction of light on a path out of a body, at a cosine with the normal, that is still inside after an event ahead.
+float staying_fraction(float cosine, float anisotropy) {
+    return min(cosine / sqrt(max(2.0 / 3.0 * (1.0 - anisotropy), 1e-30)), 1.0);
+}
+
 // Radiance times 4 pi of directed light with unit irradiance, behind a path on which it has been scattered ahead alone: diffusion
-// counts it as unscattered. depth: optical depth of its path; ahead: fraction of the extinction by such events.
-vec3 scattered_ahead(vec3 depth, vec3 ahead, float anisotropy, float cos_scatter) {
+// counts it as unscattered. depth: optical depth of its path; ahead: fraction of the extinction by such events; staying: fraction
+// of the light by two or more that counts.
+vec3 scattered_ahead(vec3 depth, vec3 ahead, float anisotropy, float cos_scatter, float staying) {
     float second = 1.5 * cos_scatter * cos_scatter - 0.5;
     vec3 none = exp(-depth);
     vec3 sum = (1.0 + 3.0 * cos_scatter) * (exp((ahead - 1.0) * depth) - none);
@@ -51,7 +63,8 @@ vec3 scattered_ahead(vec3 depth, vec3 ahead, float anisotropy, float cos_scatter
         float beyond = 4.0 * PI * henyey_greenstein(cos_scatter, power) - 1.0 - power * (3.0 * cos_scatter + 5.0 * power * second);
         sum += probability * beyond;
     }
-    return max(sum, vec3(0.0));
+    vec3 once = none * ahead * depth * ((4.0 * PI * henyey_greenstein(cos_scatter, anisotropy) - (1.0 - anisotropy)) / anisotropy);
+    return max(mix(once, sum, staying), vec3(0.0));
 }
 
 // Fraction of forward-scattered light that an interface mirrors where a ray leaves a medium, after a depth of events ahead:

@@ -30,11 +30,20 @@ void light_at_surface(ObjectRow row, vec3 point, vec3 normal, out vec3 fluence, 
     }
 }
 
+// Point of the surface above the place where light that leaves at a point, against a ray in a `direction`, was scattered last. As
+// entering light is first scattered beside where it enters. path: in metres through the object, with an optical depth.
+vec3 above_last_event(ObjectRow row, vec3 point, vec3 normal, vec3 direction, float path, vec3 optical_depth) {
+    float depth = dot((1.0 - row.ahead) * optical_depth, vec3(1.0 / 3.0));
+    vec3 along = (direction - dot(direction, normal) * normal) * (path * last_event_fraction(depth));
+    return point + along * (MOST_BESIDE / max(length(along) * length(row.grid_x), MOST_BESIDE));
+}
+
 // Basic radiance L / n^2 inside an object, below a point of its surface and against a ray there in a `direction`. normal: outwards,
-// or 0 deep inside; cosine: between both; optical_depth: of the path back through the object, on which it has been scattered.
-vec3 subsurface_exitance(int object, vec3 point, vec3 normal, vec3 direction, float cosine, vec3 optical_depth) {
+// or 0 deep inside; cosine: between both; path, optical_depth: back through the object, on which it has been scattered.
+vec3 subsurface_exitance(int object, vec3 point, vec3 normal, vec3 direction, float cosine, float path, vec3 optical_depth) {
     ObjectRow row = object_table_row(object);
     if (row.diffuses < 0.5) { return vec3(0.0); }
+    if (normal != vec3(0.0)) { point = above_last_event(row, point, normal, direction, path, optical_depth); }
     vec3 fluence;
     vec4 entering;
     vec3 travel;
@@ -47,15 +56,18 @@ vec3 subsurface_exitance(int object, vec3 point, vec3 normal, vec3 direction, fl
         flux += row.exit_weights[i] * emergent_radiance(fluence, entering.rgb, row.albedo, row.conductance, m, row.exit_cosines[i]);
     }
     float together = length(travel);
+    vec3 outwards = vec3(dot(normal, row.grid_x), dot(normal, row.grid_y), dot(normal, row.grid_z)) / length(row.grid_x);
+    // What comes through the body and goes on ahead is found by ahead_from_lights.
+    vec3 once = entering.rgb * (1.0 - min(max(dot(travel, outwards), 0.0) / max(cosine, LEAST_ENTERING_COSINE), 1.0));
     if (row.turned > 0.0 && together > 0.0) {
         // Light from several directions is scattered as by a phase function whose moments are as much smaller.
         vec4 phase = row.phase * vec4(together, together, 1.0, 1.0);
         vec3 scale = 1.0 / (row.albedo + (1.0 - row.albedo) * row.turned);
         vec3 back = normalize(vec3(dot(direction, row.grid_x), dot(direction, row.grid_y), dot(direction, row.grid_z)));
-        emergent += entering.rgb / (cosine + m) * first_events_excess(phase, scale, -dot(travel, back) / together);
+        emergent += once / (cosine + m) * first_events_excess(phase, scale, -dot(travel, back) / together);
         for (int i = 0; i < 3; ++i) {
             float up = row.exit_cosines[i];
-            flux += row.exit_weights[i] * entering.rgb / (up + m) * mean_first_events_excess(phase, scale, m, up);
+            flux += row.exit_weights[i] * once / (up + m) * mean_first_events_excess(phase, scale, m, up);
         }
     }
     vec3 scale = row.exit_share * fluence / max(flux, vec3(1e-30));
@@ -110,6 +122,15 @@ vec3 ahead_in_scattered(int object, vec3 direction, vec3 normal, vec3 optical_de
     return in_scattered * found;
 }
 
+// Fraction of a light that enters at a point of a surface, as the grid knows it: none where the body itself is before the light.
+float entering_fraction(ObjectRow row, vec3 point, vec3 normal, vec3 irradiance) {
+    vec3 fluence, travel;
+    vec4 entering;
+    light_at_surface(row, point, normal, fluence, entering, travel);
+    vec3 across = entering.rgb / (max(entering.a, LEAST_ENTERING_COSINE) * max(row.albedo, vec3(1e-6)));
+    return min(dot(across, vec3(1.0)) / max(dot(irradiance, vec3(1.0)), 1e-30), 1.0);
+}
+
 // The same of light of the lights, through a wall without an interface. normal: outwards where the ray begins inside.
 vec3 ahead_from_lights(int object, vec3 far_end, vec3 normal, vec3 direction, vec3 optical_depth) {
     ObjectRow row = object_table_row(object);
@@ -121,14 +142,17 @@ vec3 ahead_from_lights(int object, vec3 far_end, vec3 normal, vec3 direction, ve
         float down = -dot(normal, arriving.towards);
         if (leaving <= 0.0 || down <= 0.0) { continue; }
         vec3 depth = optical_depth * (leaving / down);
-        vec3 part = scattered_ahead(depth, row.ahead, 1.0 - row.turned, dot(direction, arriving.towards)) / (4.0 * PI);
-        if (max(part.r, max(part.g, part.b)) > FAINTEST_HIGHLIGHT) { sum += part * irradiance_reaching(light, arriving, far_end, -normal); }
+        float g = 1.0 - row.turned;
+        vec3 part = scattered_ahead(depth, row.ahead, g, dot(direction, arriving.towards), staying_fraction(leaving, g)) / (4.0 * PI);
+        if (max(part.r, max(part.g, part.b)) <= FAINTEST_HIGHLIGHT) { continue; }
+        part *= entering_fraction(row, far_end, direction, arriving.irradiance);
+        sum += part * irradiance_reaching(light, arriving, far_end, -normal);
     }
     return sum;
 }
 #else
 vec3 ahead_from_lights(int object, vec3 far_end, vec3 normal, vec3 direction, vec3 optical_depth) { return vec3(0.0); }
-vec3 subsurface_exitance(int object, vec3 point, vec3 normal, vec3 direction, float cosine, vec3 optical_depth) { return vec3(0.0); }
+vec3 subsurface_exitance(int object, vec3 point, vec3 normal, vec3 direction, float cosine, float path, vec3 optical_depth) { return vec3(0.0); }
 vec3 ahead_in_scattered(int object, vec3 direction, vec3 normal, vec3 optical_depth) { return vec3(0.0); }
 vec3 inclusion_exitance(int object, vec3 point, vec3 color) { return vec3(0.0); }
 #endif

@@ -174,7 +174,7 @@ vec3 through_media(inout Ray ray, int effective, Hit hit, vec3 normal) {
     }
     if (effective != AIR) {
         float cosine = clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0);
-        traced_radiance += ray.throughput * subsurface_exitance(effective, ray.origin, ray.outwards, ray.direction, cosine, medium.extinction * path);
+        traced_radiance += ray.throughput * subsurface_exitance(effective, ray.origin, ray.outwards, ray.direction, cosine, path, medium.extinction * path);
         traced_radiance += ray.throughput * ahead_in_scattered(effective, ray.direction, normal, medium.extinction * path);
         vec3 far_end = ray.origin + hit.path * ray.direction;
         traced_radiance += ray.throughput * ahead_from_lights(effective, far_end, ray.outwards, ray.direction, medium.extinction * path);

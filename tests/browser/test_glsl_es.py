@@ -129,7 +129,7 @@ def test_library_functions_equal_their_twins(web_page: WebPage) -> None:
                 }
             )
             cases.append((path.stem, signature, arguments))
-    assert len(jobs) == 76
+    assert len(jobs) == 78
     for (library, signature, arguments), job, text in zip(cases, jobs, web_page.run(FEEDBACK, jobs), strict=True):
         found = decoded(text)
         found = found if job["width"] == 1 else found.reshape(-1, job["width"])

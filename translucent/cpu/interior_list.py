@@ -143,10 +143,8 @@ class Branches:
         Squared width of its lobe, as of the microfacets of a mirror: the sum over rough interfaces.
     footprint : (n, 2, 2, 3) float64
         Differentials of origins and of directions; (n, 0, 2, 3) where nothing is averaged over footprints.
-    diffused : (n, 3) float64
-        Basic radiance along it of light that has diffused in the body where it begins, if all was scattered there.
     outwards : (n, 3) float64
-        Normal of that body there, outwards; 0 where it has none.
+        Normal of the body in which it begins, there, outwards; 0 where it has none.
     """
 
     origins: Array
@@ -160,7 +158,6 @@ class Branches:
     reflected: Mask
     blur: Array
     footprint: Array
-    diffused: Array
     outwards: Array
 
     def __len__(self) -> int:

@@ -32,7 +32,12 @@ from translucent.diffusion.field import DiffusionField
 from translucent.diffusion.interfaces import AIR, InterfaceTable
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface
-from translucent.formulas.diffusion import IN_SCATTERED_ROUGHNESS, ahead_mirrored, scattered_ahead
+from translucent.formulas.diffusion import (
+    IN_SCATTERED_ROUGHNESS,
+    ahead_mirrored,
+    scattered_ahead,
+    staying_fraction,
+)
 from translucent.formulas.interface import reflected_direction, refracted_direction
 from translucent.geometry.ray_caster import dot, unit
 from translucent.reference.compositing import composite, emission_of_mixtures
@@ -170,17 +175,30 @@ class DiffusionFields:
             found[body == number] = 0.0 if field.travel is None else max(field.phase.mean_cosine, 0.0)
         return found
 
-    def radiance(self, body: Integers, points: Array, directions: Array, normals: Array) -> Array:
-        """(k, 3): basic radiance against rays that start at points (k, 3) of surfaces, inside `body` (k,).
-
-        As if all light was scattered on the rest of their path through the body. `normals` (k, 3) look outwards.
-        """
+    def irradiance_entering(self, body: Integers, points: Array, normals: Array) -> Array:
+        """(k, 3): irradiance of light that enters bodies (k,), see `DiffusionField.irradiance_entering`."""
         found = np.zeros(points.shape)
-        cosine = np.abs(dot(directions, normals))
         for number, field in self._fields.items():
             own = np.flatnonzero(body == number)
+            found[own] = field.irradiance_entering(points[own], normals[own])
+        return found
+
+    def radiance(
+        self, body: Integers, points: Array, directions: Array, normals: Array, path: Array, optical_depth: Array
+    ) -> Array:
+        """(k, 3): basic radiance against rays that start at points (k, 3) of surfaces, inside `body` (k,).
+
+        As if all light was scattered on the rest of their `path` (k,), in metres, through the body, with an
+        `optical_depth` (k, 3). `normals` (k, 3) look outwards; where they are 0 there is no surface, and no light.
+        """
+        found = np.zeros(points.shape)
+        cosine, surface = np.abs(dot(directions, normals)), normals.any(axis=1)
+        for number, field in self._fields.items():
+            own = np.flatnonzero((body == number) & surface)
             if own.size:
-                found[own] = field.scattered_radiance(points[own], normals[own], directions[own], cosine[own])
+                rays = normals[own], directions[own]
+                above = field.above_last_events(points[own], *rays, path[own], optical_depth[own])
+                found[own] = field.scattered_radiance(above, *rays, cosine[own])
         return found
 
 
@@ -272,6 +290,12 @@ class RayTree:
         return found
 
 
+def _from_inside(branches: Branches, normals: Array) -> Branches:
+    """Branches that start inside bodies at surfaces with `normals` (n, 3), with these outwards."""
+    along = dot(branches.directions, normals)
+    return replace(branches, outwards=np.where(along[:, None] < 0.0, normals, -normals))
+
+
 class _Growth:
     """Growth of a ray tree, for light with the same indices of refraction."""
 
@@ -311,7 +335,6 @@ class _Growth:
             np.zeros(count, dtype=bool),
             np.zeros(count),
             self._pixel_footprints(rays.directions),
-            np.zeros((count, 3)),
             np.zeros((count, 3)),
         )
         while len(branches):
@@ -405,8 +428,11 @@ class _Growth:
         """Add subsurface light, and in-scattered light of forward scattering, which diffusion counts as unscattered."""
         body = self.media.effective(branches.interior)
         ahead, far, near = np.moveaxis(self.tree.diffused.in_scattered(body), 1, 0)
+        optical_depth, rays = -np.log(np.maximum(passed, np.finfo(np.float64).tiny)), self._rays(branches)
+        points, path = rays.origins + self.scene.camera.eye, length * self.caster.radius
+        diffused = self.tree.diffused.radiance(body, points, rays.directions, branches.outwards, path, optical_depth)
         with np.errstate(under="ignore"):
-            self._add(branches, branches.diffused * (1.0 - passed ** (1.0 - ahead)))
+            self._add(branches, diffused * (1.0 - passed ** (1.0 - ahead)))
         in_scattered = np.flatnonzero(ahead.any(axis=1))
         if in_scattered.size:
             own, ahead, far, near = (
@@ -448,14 +474,19 @@ class _Growth:
         rays, ahead = self._rays(branches), self.tree.diffused.in_scattered(body[walls])[:, 0]
         ends = rays.origins + length[walls, None] * rays.directions
         depth = -np.log(np.maximum(passed[walls], np.finfo(np.float64).tiny))
-        found = np.zeros(ends.shape)
+        found, eye = np.zeros(ends.shape), self.scene.camera.eye
+        entering = self.tree.diffused.irradiance_entering(body[walls], ends + eye, rays.directions)
         for light in self.tree.light.paths.lights:
             travel, _ = direction_and_distance(light, ends)
             down, turn = dot(branches.outwards, travel), dot(branches.directions, -travel)
             lit = np.flatnonzero(down > 0.0)
             along = depth[lit] * (leaving[lit] / down[lit])[:, None]
-            part = scattered_ahead(along, ahead[lit], anisotropy[lit, None], turn[lit, None]) / (4.0 * np.pi)
+            staying = staying_fraction(leaving, anisotropy)[lit, None]
+            part = scattered_ahead(along, ahead[lit], anisotropy[lit, None], turn[lit, None], staying) / (4.0 * np.pi)
             arriving = light.irradiance_on(ends[lit], -travel[lit])
+            # None where the body itself is before the light.
+            sums = entering[lit].sum(axis=1), np.maximum(arriving.sum(axis=1), np.finfo(np.float64).tiny)
+            part *= np.minimum(sums[0] / sums[1], 1.0)[:, None]
             found[lit] += part * arriving * self.tree.light.to_interfaces(light, ends[lit])
         self._add(branches, found)
 
@@ -523,7 +554,7 @@ class _Growth:
                 replace(branch, footprint=footprint) for branch, footprint in zip((back, on), footprints, strict=True)
             )
         if self.tree.diffused:
-            back, on = (self._from_inside(branch, found.at.normal) for branch in (back, on))
+            back, on = (_from_inside(branch, found.at.normal) for branch in (back, on))
         brightness = largest(back.throughput), largest(on.throughput)
         is_back, is_on = (bright > 0.0 for bright in brightness)
         stronger = back.throughput @ LUMINANCE > on.throughput @ LUMINANCE
@@ -542,15 +573,6 @@ class _Growth:
             self._look_up(replace(ended, blur=np.where(inside, 1.0, ended.blur)))
             kept.append(branch.where(follow))
         return kept
-
-    def _from_inside(self, branches: Branches, normals: Array) -> Branches:
-        """Branches that start inside bodies, with the subsurface light there."""
-        points = self._rays(branches).origins + self.scene.camera.eye
-        body = self.media.effective(branches.interior)
-        along = dot(branches.directions, normals)
-        outwards = np.where(along[:, None] < 0.0, normals, -normals)
-        diffused = self.tree.diffused.radiance(body, points, branches.directions, outwards)
-        return replace(branches, diffused=diffused, outwards=outwards)
 
     def _add_coats(self, branches: Branches, found: BranchInteractions) -> None:
         """Add the environment's reflection in clear coats whose roughness differs from that of the interface below."""

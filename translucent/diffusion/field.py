@@ -29,7 +29,7 @@ from translucent.diffusion.grid import BodyGrid
 from translucent.diffusion.keys import dimming_key, environment_key, kept, light_key, may_dim
 from translucent.diffusion.lit_body import LitBody
 from translucent.diffusion.photons import EnteringPhotons
-from translucent.diffusion.sides import beside, read_sides
+from translucent.diffusion.sides import REACH, beside, read_sides
 from translucent.diffusion.solution import BodySystem, DiffuseSolution
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, exit_quadrature
@@ -39,6 +39,7 @@ from translucent.formulas.diffusion import (
     emergent_radiance,
     first_events_excess,
     in_scattered_shares,
+    last_event_fraction,
     mean_first_events_excess,
 )
 from translucent.formulas.phase import PhaseFunction
@@ -166,6 +167,29 @@ class DiffusionField:
         fluence, entering = (self.at_surface(volume, points, normals) for volume in volumes)
         return self._emergent(fluence, entering, cosine)
 
+    def above_last_events(
+        self, points: Array, normals: Array, directions: Array, path: Array, optical_depth: Array
+    ) -> Array:
+        """(k, 3): points of the surface above the places where light was scattered last that leaves at `points` (k, 3).
+
+        As entering light is first scattered beside where it enters (`LateralShift`), paths being the same in both
+        directions. The twin of ``above_last_event`` in ``shaders/shade/diffused_light.glsl``.
+
+        Parameters
+        ----------
+        points, normals, directions : (k, 3) float64
+            Of the surface; and of rays from there into the body.
+        path : (k,) float64
+            Of the rays through the body, in metres.
+        optical_depth : (k, 3) float64
+            Of these.
+        """
+        depth = ((1.0 - self.ahead) * optical_depth).mean(axis=1)
+        level = directions - np.einsum("ki,ki->k", directions, normals)[:, None] * normals
+        along = level * (path * last_event_fraction(depth))[:, None]
+        most = REACH * self.step
+        return np.asarray(points + along * (most / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), most)))
+
     def scattered_radiance(self, points: Array, normals: Array, directions: Array, cosine: Array) -> Array:
         """`radiance` as if all light was scattered on the path through the body: the twin of ``diffused_light.glsl``.
 
@@ -178,7 +202,16 @@ class DiffusionField:
         if self.travel is None:
             return self._emergent(fluence, entering, cosine)
         travel = self.at_surface(self.travel, points, normals) - 1.0
-        return self._emergent(fluence, entering, cosine, travel, directions @ self.turn)
+        # What comes through the body and goes on ahead is found by renderers: see `scattered_ahead`.
+        outwards = np.maximum((travel * (normals @ self.turn)).sum(axis=1), 0.0)
+        lit = 1.0 - np.minimum(outwards / np.maximum(cosine, LEAST_COSINE), 1.0)[:, None]
+        return self._emergent(fluence, entering, cosine, travel, directions @ self.turn, lit)
+
+    def irradiance_entering(self, points: Array, normals: Array) -> Array:
+        """(k, 3): irradiance across its direction of light that enters at points (k, 3) with normals (k, 3)."""
+        entering = self.at_surface(self._scattered_entering, points, normals)
+        albedo = np.maximum(self.albedo, np.finfo(np.float32).tiny)
+        return np.asarray(entering[:, :3] / (np.clip(entering[:, 3:], LEAST_COSINE, 1.0) * albedo))
 
     @property
     def _scattered_entering(self) -> Volume:
@@ -196,8 +229,12 @@ class DiffusionField:
         cosine: Array,
         travel: Array | None = None,
         directions: Array | None = None,
+        lit: Array | float = 1.0,
     ) -> Array:
-        """Radiance against rays at cosines (k,), and in directions (k, 3) in the grid where light has one (k, 3)."""
+        """Radiance against rays at cosines (k,), and in directions (k, 3) in the grid where light has one (k, 3).
+
+        `lit` (k, 1) is the fraction of first events that count with their angle.
+        """
         mean = np.clip(entering[:, 3:], LEAST_COSINE, 1.0)
 
         def light(mu: npt.ArrayLike) -> Array:
@@ -213,7 +250,7 @@ class DiffusionField:
                 phase[:, :2] *= together[:, None]
                 scale = 1.0 / (self.albedo + (1.0 - self.albedo) * (1.0 - self.phase.mean_cosine))
                 turned = -(travel * directions).sum(axis=1) / np.maximum(together, np.finfo(np.float64).tiny)
-                once = entering[:, :3]
+                once = lit * entering[:, :3]
                 found = found + once / (cosine[:, None] + mean) * first_events_excess(phase, scale, turned[:, None])
                 for mu, weight in zip(*self.exits, strict=True):
                     excess = mean_first_events_excess(phase, scale, mean, mu)

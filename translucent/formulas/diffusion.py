@@ -30,6 +30,9 @@ AZIMUTHS = 4
 #: (Eddington 1926).
 UNIFORM_COSINE = 3.0**-0.5
 
+#: Least optical depth in `last_event_fraction`: float32 then finds it within 1e-4.
+LEAST_EVENT_DEPTH = 0.03
+
 #: Angle in radians, beside the critical one, at which the reflectance of forward-scattered light goes from that of rays
 #: to that of diffuse light in proportion to its mean cosine: see `ahead_mirrored`.
 AHEAD_ANGLE = 0.5
@@ -119,8 +122,45 @@ def mean_first_events_excess(
     )
 
 
+def last_event_fraction(optical_depth: npt.ArrayLike) -> Array:
+    """Mean distance of the last scattering event from where a ray leaves a body, as a fraction of its path there.
+
+    On a path of optical depth tau the last event is at a depth t with the probability exp(-t) / (1 - exp(-tau)), whose
+    mean is 1 - tau / (exp(tau) - 1): a free path in thick bodies, and half the path in thin ones.
+
+    Parameters
+    ----------
+    optical_depth : array_like (...)
+        tau; below `LEAST_EVENT_DEPTH` it counts as that.
+    """
+    depth = np.maximum(np.asarray(optical_depth, np.float64), LEAST_EVENT_DEPTH)
+    return np.asarray(1.0 / depth + 1.0 - 1.0 / optics.opacity(depth))
+
+
+def staying_fraction(cosine: npt.ArrayLike, anisotropy: npt.ArrayLike) -> Array:
+    """Fraction of light on a path out of a body that is still inside after an event ahead, see `scattered_ahead`.
+
+    Events ahead have the second Legendre moment g: the mean squared sine of their angles is 2 (1 - g) / 3. Light on
+    paths that make a smaller angle with the surface than that leaves at once where it is turned outwards. Across walls
+    all of it stays.
+
+    Parameters
+    ----------
+    cosine : array_like (...)
+        Of the path with the normal where it leaves, 0 to 1.
+    anisotropy : array_like (...)
+        g.
+    """
+    sine = np.sqrt(np.maximum(2.0 / 3.0 * (1.0 - np.asarray(anisotropy, np.float64)), np.finfo(np.float32).tiny))
+    return np.asarray(np.minimum(np.asarray(cosine, np.float64) / sine, 1.0))
+
+
 def scattered_ahead(
-    depth: npt.ArrayLike, ahead: npt.ArrayLike, anisotropy: npt.ArrayLike, cos_scatter: npt.ArrayLike
+    depth: npt.ArrayLike,
+    ahead: npt.ArrayLike,
+    anisotropy: npt.ArrayLike,
+    cos_scatter: npt.ArrayLike,
+    staying: npt.ArrayLike = 1.0,
 ) -> Array:
     """Radiance times 4 pi of directed light with unit irradiance, behind a path on which it has been scattered ahead.
 
@@ -141,6 +181,8 @@ def scattered_ahead(
         g, more than 0 and at most 1.
     cos_scatter : array_like (..., 1)
         Between the directions of travel of the light, before and behind.
+    staying : array_like (..., 1)
+        Fraction of the light by two or more events that counts, see `staying_fraction`.
     """
     t, part, g, cosine = (np.asarray(x, np.float64) for x in (depth, ahead, anisotropy, cos_scatter))
     second = 1.5 * cosine * cosine - 0.5
@@ -154,7 +196,8 @@ def scattered_ahead(
             lower = 1.0 + power * (3.0 * cosine + 5.0 * power * second)
             beyond = 4.0 * np.pi * henyey_greenstein(cosine, power) - lower
             total = total + np.where(power < LEAST_POWER, 0.0, probability * beyond)
-    return np.maximum(total, 0.0)
+        once = none * part * t * (4.0 * np.pi * henyey_greenstein(cosine, g) - (1.0 - g)) / g
+    return np.maximum(once + np.asarray(staying, np.float64) * (total - once), 0.0)
 
 
 @np.errstate(under="ignore")

@@ -5,9 +5,16 @@ from __future__ import annotations
 from typing import get_args
 
 from translucent.diffusion.environment_ahead import DEPTHS, HEIGHT, WIDTH
+from translucent.diffusion.sides import REACH
 from translucent.formulas.bsdf import TABLE_SIZE
 from translucent.formulas.color import LUMINANCE_WEIGHTS
-from translucent.formulas.diffusion import AHEAD_ANGLE, AZIMUTHS, IN_SCATTERED_ROUGHNESS, LEAST_COSINE
+from translucent.formulas.diffusion import (
+    AHEAD_ANGLE,
+    AZIMUTHS,
+    IN_SCATTERED_ROUGHNESS,
+    LEAST_COSINE,
+    LEAST_EVENT_DEPTH,
+)
 from translucent.formulas.interface import CLEARCOAT_IOR
 from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
 from translucent.formulas.sampling import ALPHA_OF_DEVIATION, LEAST_ACROSS, LEAST_BREADTH, MOST_LOOKUPS
@@ -148,6 +155,8 @@ CONSTANTS: dict[str, str] = {
     "HARMONIC_2": repr(BAND_2),
     "HARMONIC_2_ZONAL": repr(BAND_2_ZONAL),
     "LEAST_ENTERING_COSINE": repr(LEAST_COSINE),
+    "LEAST_EVENT_DEPTH": repr(LEAST_EVENT_DEPTH),
+    "MOST_BESIDE": repr(REACH),
     "AZIMUTHS": repr(AZIMUTHS),
     "CLEARCOAT_IOR": repr(CLEARCOAT_IOR),
     "GROUND_TOLERANCE": repr(TOLERANCE),

@@ -319,7 +319,7 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
             "up to 15 % too dark"
         )
         if scene.lights:
-            text += "; where lights shine from behind, bodies are up to 35 % too dark, and rims up to 90 % too bright"
+            text += "; where lights shine from behind, bodies are up to 20 % too dark, and rims up to 40 % too bright"
         if rest := [body for body in scene.bodies if body not in bodies]:
             text += f"; up to 10 % too dark next to {object_names(rest)}, whose light does not reach these bodies"
         ahead = [body.medium is not None and body.medium.anisotropy >= STRONGLY_AHEAD for body in bodies]
