@@ -14,9 +14,10 @@ struct IrradianceMap {
     vec3 z;
     vec3 size;
     float layer;
+    float lit;  // 1 where it has the light of the lights, too
 };
 
-const IrradianceMap NO_IRRADIANCE_MAP = IrradianceMap(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+const IrradianceMap NO_IRRADIANCE_MAP = IrradianceMap(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0);
 
 #if DIFFUSED
 #include "shade/diffused_texture.glsl"

@@ -35,10 +35,10 @@ const vec4 vertex_color = vec4(1.0);
 #endif
 
 #if DIFFUSED && !DEPTH_ONLY
-uniform vec4 opaque_map[5];  // of `IrradianceMap`, the layer beside the corner
+uniform vec4 opaque_map[5];  // of `IrradianceMap`, the layer beside the corner, and whether it is lit
 
 IrradianceMap own_map() {
-    return IrradianceMap(opaque_map[0].xyz, opaque_map[1].xyz, opaque_map[2].xyz, opaque_map[3].xyz, opaque_map[4].xyz, opaque_map[0].w);
+    return IrradianceMap(opaque_map[0].xyz, opaque_map[1].xyz, opaque_map[2].xyz, opaque_map[3].xyz, opaque_map[4].xyz, opaque_map[0].w, opaque_map[1].w);
 }
 #else
 IrradianceMap own_map() { return NO_IRRADIANCE_MAP; }

@@ -120,6 +120,7 @@ vec3 opaque_radiance_of(OpaqueSurface surface, vec3 normal, vec3 ray, vec3 point
     float cos_view = clamp(-dot(normal, ray), 1e-3, 1.0);
     OpaqueBsdf bsdf = opaque_bsdf(surface, cos_view);
     vec3 sum = opaque_environment(surface, bsdf, normal, reflected_direction(ray, normal), point);
+    if (surface.map.lit > 0.0) { bsdf.base = bsdf.passed = vec3(0.0); }  // lights are left to mirror
     for (int light = 0; light < light_count; ++light) {
         LightSample arriving = light_at(light, point);
         float cos_light = dot(normal, arriving.towards);

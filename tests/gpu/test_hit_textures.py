@@ -33,8 +33,7 @@ def screen(texture: tl.Texture) -> tl.Object:
     return tl.Object(square(0.0), None, surface=surface)
 
 
-@pytest.mark.parametrize("across", ["repeat", "clamp"])
-@pytest.mark.parametrize("upwards", ["repeat", "clamp"])
+@pytest.mark.parametrize(("across", "upwards"), [("repeat", "clamp"), ("clamp", "repeat")])
 def test_values_are_those_of_the_texture(
     across: str, upwards: str, renderer: tl.Renderer, rng: np.random.Generator
 ) -> None:

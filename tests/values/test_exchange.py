@@ -224,3 +224,20 @@ def test_light_on_a_ball_in_glass_is_what_its_surface_lets_in(monkeypatch: pytes
         assert plan(scene).exchanging == (1,)
         found = irradiance_maps.irradiance_maps(scene, (1,))[1].at(0.5 * normals, normals)
         np.testing.assert_allclose(found / np.pi, np.tile(expected, (4, 1)), atol=0.02)
+
+
+def test_light_of_lights_on_a_ball_in_glass_is_as_much_as_the_glass_collects(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The inner ball looks n times as large from the light, and all that is directed there and not mirrored lands."""
+    monkeypatch.setattr(irradiance_maps, "SAMPLES", 256)
+    objects = (
+        tl.Object(Sphere().tessellate(64), tl.Medium(ior=1.5)),
+        tl.Object(Sphere(radius=0.5).tessellate(48), None, color=(0, 0, 0)),
+    )
+    scene = tl.Scene(list(objects), CAMERA, [tl.DirectionalLight((0, 0, -1), 1.0)], BLACK)
+    places = 0.75 * np.sqrt((np.arange(1000) + 0.5) / 1000)
+    passed = 1.0 - optics.fresnel_dielectric(np.sqrt(1.0 - places**2), 1.5)
+    normals = even_directions(256)
+    found = irradiance_maps.irradiance_maps(scene, (1,), 1 << 14)[1]
+    assert found.lit
+    black = 0.75**2 * passed.mean() / (4.0 * 0.5**2 * 1.5**2)
+    np.testing.assert_allclose(found.at(0.5 * normals, normals).mean(), black, rtol=0.03)

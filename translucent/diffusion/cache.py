@@ -23,6 +23,7 @@ from translucent.diffusion.keys import (
     kept,
     media_lit_by_photons,
     opaque_key,
+    photons_on_opaque,
     place_of,
     roughness_of,
 )
@@ -141,7 +142,7 @@ class FieldCache:
                 if i not in bodies
             }
             ground = ground_map(scene, {i: own.lit for i, own in bodies.items()}, surfaces)
-            maps = irradiance_maps(scene, plan.exchanging) if plan.exchanging else {}
+            maps = irradiance_maps(scene, plan.exchanging, photons_on_opaque(plan)) if plan.exchanging else {}
             return Fields(surfaces, volumes, ground, maps)
 
         with self._lock, one_blas_thread():

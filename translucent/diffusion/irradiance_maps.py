@@ -40,6 +40,8 @@ class IrradianceMap:
 
     Attributes
     ----------
+    lit : bool
+        It is inside bodies, and photons have carried the light of all lights there.
     values : (6, x, y, z, 3) float32
         For each side, see `SurfaceSides`; as basic radiance, E / n^2 in a medium of index n.
     low : (3,) float64
@@ -50,6 +52,7 @@ class IrradianceMap:
         Side of a cell in metres.
     """
 
+    lit: bool
     values: Floats
     low: Array
     turn: Array
@@ -89,15 +92,27 @@ class _Samples:
     def normals(self) -> Array:
         return self.pose.outwards(self.grid.face_normals)
 
-    def map(self, irradiance: Array) -> IrradianceMap:
+    def nearest(self, places: Array, towards: Array) -> Integers:
+        """(k,): index among these of the nearest one to places (k, 3) that look `towards` (k, 3)."""
+        return nearest_samples(self.points, self.normals, self.grid.area, places, towards)
+
+    def map(self, irradiance: Array, *, lit: bool) -> IrradianceMap:
         cells = self.grid.cells
         (values,) = SurfaceSides.of(self.grid).volumes([(irradiance[self.numbers], 0.0)])
         low = self.pose.outwards(cells.low) + self.pose.shift
-        return IrradianceMap(values, low, self.pose.turn, cells.step)
+        return IrradianceMap(lit, values, low, self.pose.turn, cells.step)
 
 
-def irradiance_maps(scene: Scene, objects: Sequence[int]) -> dict[int, IrradianceMap]:
-    """Irradiance on closed opaque objects, by their numbers."""
+def irradiance_maps(scene: Scene, objects: Sequence[int], photons: int = 0) -> dict[int, IrradianceMap]:
+    """Irradiance on closed opaque objects, by their numbers.
+
+    Parameters
+    ----------
+    scene : Scene
+    objects : sequence of int
+    photons : int
+        Number of photons that carry the light of lights to objects inside bodies. With 0, it comes straight.
+    """
     samples: dict[int, _Samples] = {}
     count = 0
     for i in objects:
@@ -108,8 +123,10 @@ def irradiance_maps(scene: Scene, objects: Sequence[int]) -> dict[int, Irradianc
         grid = body_grid(own, np.sqrt(3.0 * area / SAMPLES))
         samples[i] = _Samples(grid, Pose.of(scene.objects[i].matrix)[0], count + np.arange(len(grid.points)))
         count += len(grid.points)
-    irradiance = _Gathering(scene, samples, count).irradiance()
-    return {i: own.map(irradiance) for i, own in samples.items()}
+    gathering = _Gathering(scene, samples, count)
+    lit = gathering.enclosed if photons else set()
+    irradiance = gathering.irradiance(lit, photons)
+    return {i: own.map(irradiance, lit=i in lit) for i, own in samples.items()}
 
 
 class _Gathering:
@@ -127,32 +144,58 @@ class _Gathering:
         #: Index of each object of the scene among the opaque ones with faces.
         numbers = {id(item): k for k, item in enumerate(self.surfaces.objects)}
         self.opaque = np.array([numbers.get(id(item), -1) for item in scene.objects])
+        self.inside = windings_at(scene, self.starts, self.normals)
         self.first: Array = np.zeros((count, 3))
         #: Sample that receives light, sample that sends it, and the fraction that arrives.
         self.links: list[tuple[Integers, Integers, Array]] = []
 
-    def irradiance(self) -> Array:
-        """(s, 3): irradiance at the samples."""
+    @property
+    def enclosed(self) -> set[int]:
+        """Objects that are all inside bodies."""
+        within = np.asarray(self.inside.any(axis=1))
+        return {i for i, own in self.samples.items() if within[own.numbers].all()}
+
+    def irradiance(self, lit: set[int], photons: int) -> Array:
+        """(s, 3): irradiance at the samples; on objects `lit` with that of lights, by photons."""
         self._trace()
         direct = self._direct(self.points, self.normals)
+        bent = self._by_photons(lit, photons) if lit else np.zeros((self.count, 3))
+        for i in lit:
+            direct[self.samples[i].numbers] = bent[self.samples[i].numbers]
         receiver, sender, fraction = (np.concatenate(part) for part in zip(*self.links, strict=True))
         found = self.first.copy()
         for channel in range(3):
             exchange = sparse.csr_array((fraction[:, channel], (receiver, sender)), (self.count, self.count))
             for _ in range(ROUNDS):
                 found[:, channel] = self.first[:, channel] + exchange @ (found[:, channel] + direct[:, channel])
-        return found
+        return found + bent
+
+    def _by_photons(self, lit: set[int], photons: int) -> Array:
+        """(s, 3): irradiance by photons that interfaces have refracted or reflected, on objects `lit`."""
+        power = np.zeros((self.count, 3))
+        for step in self.tracer.steps(photons):
+            landed = step.landed.where(step.landed.bent)
+            item, face = self.tracer.surfaces_of(landed)
+            normals = self.surfaces.normals(self.surfaces.first[self.opaque[item]] + face)
+            # In a medium of index n, power is of the irradiance, and n^2 times as much as of E / n^2.
+            arriving = landed.power / self.tracer.iors_around(landed)[:, None] ** 2
+            for i in lit.intersection(item.tolist()):
+                own, here = self.samples[i], np.flatnonzero(item == i)
+                sample = own.numbers[own.nearest(landed.origins[here], normals[here])]
+                for channel in range(3):
+                    power[:, channel] += np.bincount(sample, arriving[here, channel], self.count)
+        areas = np.concatenate([own.grid.areas for own in self.samples.values()])
+        return np.asarray(power / areas[:, None])
 
     def _trace(self) -> None:
         tracer = self.tracer
-        inside = windings_at(self.scene, self.starts, self.normals)
         none = np.zeros(0, np.int64)
         self.links.append((none, none, np.zeros((0, 3))))
         for part in np.array_split(np.arange(self.count), self.count * RAYS // BATCH + 1):
             own, directions = hemispheres(self.normals[part], RAYS)
             owner = part[own]
             whole = np.full((len(owner), 3), 1.0 / RAYS)
-            going = tracer.begun_at(self.starts[owner], directions, whole, inside[owner])
+            going = tracer.begun_at(self.starts[owner], directions, whole, self.inside[owner])
             for _ in range(MOST_SURFACES):
                 if not len(going.number):
                     break
@@ -177,7 +220,7 @@ class _Gathering:
         known = np.isin(item, list(self.samples))
         for i in np.unique(item[known]):
             own, here = self.samples[i], np.flatnonzero(item == i)
-            sender = nearest_samples(own.points, own.normals, own.grid.area, points[here], normals[here])
+            sender = own.nearest(points[here], normals[here])
             self.links.append((owner[landed.number[here]], own.numbers[sender], fraction[here]))
         other = np.flatnonzero(~known)
         if other.size and self.scene.lights:

@@ -19,13 +19,16 @@ from translucent.scene.scene import Light, Object, Scene
 
 _T = TypeVar("_T")
 
+#: Least number of photons that light opaque objects inside bodies.
+PHOTONS_ON_OPAQUE = 1 << 16
+
 
 def diffusion_key(plan: RenderPlan) -> Hashable:
     """Key of all values that the multiply scattered light of a plan depends on; it does not depend on the camera."""
     scene, caustics = plan.scene, plan.caustics
     followed = caustics is not None and media_lit_by_photons(scene)
     bending = (caustics.in_media, caustics.seed, _bending(scene)) if caustics is not None and followed else ()
-    exchange = (plan.exchanging, _bending(scene)) if plan.exchanging else ()
+    exchange = (plan.exchanging, photons_on_opaque(plan), _bending(scene)) if plan.exchanging else ()
     bodies = tuple(
         (
             i,
@@ -65,6 +68,13 @@ def may_dim(item: Object) -> bool:
     """True for a body of even density, neither a layer nor a sheet, that absorbs or scatters light."""
     plain = item.density is None and item.sheet_thickness is None and not item.covers
     return plain and item.medium is not None and bool(np.any(item.medium.extinction))
+
+
+def photons_on_opaque(plan: RenderPlan) -> int:
+    """Number of photons that light opaque objects inside bodies; 0 where their light is found as that of others."""
+    if plan.caustics is None or plan.traced or not plan.exchanging:
+        return 0
+    return max(plan.caustics.photons, PHOTONS_ON_OPAQUE)
 
 
 def media_lit_by_photons(scene: Scene) -> tuple[int, ...]:

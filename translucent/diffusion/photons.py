@@ -131,17 +131,8 @@ def photon_segments(scene: Scene, photons: int, seed: int) -> Iterator[PhotonSeg
     seed : int
         Of the random numbers.
     """
-    tracer = PhotonTracer(scene, np.random.default_rng((seed, 0x6D656469)))
-    for aim in photon_aims(scene, np.zeros(3), photons):
-        starts = (plane_points(aim.photons) + tracer.rng.random(2)) % 1.0
-        for first in range(0, aim.photons, BATCH):
-            going = tracer.begun(aim, starts[first : first + BATCH])
-            for _ in range(MOST_SURFACES):
-                if not len(going.origins):
-                    break
-                step = tracer.step(going)
-                going = step.going
-                yield step.segments
+    for step in PhotonTracer(scene, np.random.default_rng((seed, 0x6D656469))).steps(photons):
+        yield step.segments
 
 
 class PhotonStep(NamedTuple):
@@ -184,6 +175,19 @@ class PhotonTracer:
         self._table = InterfaceTable(scene, [item.sheet_thickness for item in objects])
         #: (objects, 3): in 1/m; what is scattered ahead counts as unscattered.
         self._extinction = np.stack([_reduced_extinction(item) for item in objects])
+
+    def steps(self, photons: int) -> Iterator[PhotonStep]:
+        """Steps of about `photons` photons from the lights."""
+        for aim in photon_aims(self.scene, np.zeros(3), photons):
+            starts = (plane_points(aim.photons) + self.rng.random(2)) % 1.0
+            for first in range(0, aim.photons, BATCH):
+                going = self.begun(aim, starts[first : first + BATCH])
+                for _ in range(MOST_SURFACES):
+                    if not len(going.origins):
+                        break
+                    step = self.step(going)
+                    going = step.going
+                    yield step
 
     def begun(self, aim: PhotonAim, starts: Array) -> Photons:
         """Photons at the light, or where they come near the scene."""
@@ -239,6 +243,10 @@ class PhotonTracer:
         column = self._table.is_opaque[item].argmax(axis=1)
         row = np.arange(len(column))
         return item[row, column], self._caster.faces.number[photons.last[row, column]]
+
+    def iors_around(self, photons: Photons) -> Array:
+        """(n,): indices of refraction where photons are."""
+        return np.asarray(self._table.iors[self._effective(photons.windings, photons.since), photons.channel])
 
     def step(self, going: Photons) -> PhotonStep:
         """Follow photons to the next surface, and on from there."""

@@ -77,7 +77,8 @@ class DiffusedTexture:
     def rows(self, center: Array) -> dict[int, dict[str, npt.ArrayLike]]:
         """Fields of a `OBJECT_ROW` of each object, for positions that count from `center`."""
         maps = {
-            number: self._placed(number, own, own.values.shape[1:4], center) for number, own in self.fields.maps.items()
+            number: {**self._placed(number, own, own.values.shape[1:4], center), "diffuses": float(own.lit)}
+            for number, own in self.fields.maps.items()
         }
         return maps | {
             number: {
@@ -121,8 +122,8 @@ class DiffusedTexture:
             return [(0.0,) * 4] * 5
         placed = self._placed(number, own, own.values.shape[1:4], center)
         names = "grid_low", "grid_x", "grid_y", "grid_z", "grid_size"
-        layer = (float(self.first_layers[number]), 0.0, 0.0, 0.0, 0.0)
-        return [(*map(float, np.asarray(placed[name])), w) for name, w in zip(names, layer, strict=True)]
+        beside = (float(self.first_layers[number]), float(own.lit), 0.0, 0.0, 0.0)
+        return [(*map(float, np.asarray(placed[name])), w) for name, w in zip(names, beside, strict=True)]
 
 
 def ground_uniforms(light: DiffusedTexture | None, center: Array) -> dict[str, npt.ArrayLike]:

@@ -406,7 +406,11 @@ OBJECT_ROW = PackedTable(
         ("stream_scattering", "f4", (3,)),
         ("inner_mirror", "f4", ()),  # fraction of diffuse light from inside that its interface reflects
         ("grid_low", "f4", (3,)),  # corner of the grid of its diffused light, from the center of the media
-        ("diffuses", "f4", ()),  # 1 where light diffuses in it
+        (
+            "diffuses",
+            "f4",
+            (),
+        ),  # 1 where light diffuses in it; of an opaque object, where its map has the light of lights
         ("grid_size", "f4", (3,)),  # cells along each axis
         ("first_layer", "f4", ()),  # of the grid in the texture of all grids
         ("grid_x", "f4", (3,)),  # its axes, in cells per metre
