@@ -28,7 +28,7 @@ vec3 facing_normal(vec3 normal, vec3 direction) {
 
 // normal: for shading; before, after: bodies on both sides that decide on the medium.
 Interaction interaction_at(SurfaceHit hit, ObjectRow body, vec3 point, vec3 direction, vec3 normal, int before, int after, int channel) {
-    bool thin_walled = int(body.type) == TYPE_THIN_WALL;
+    bool thin_walled = is_thin_wall(body);
     float ior_before = index_of(before, channel);
     float ior = index_of(thin_walled ? hit.object : after, channel) / ior_before;
     return Interaction(hit.object, hit.outside, thin_walled, thin_walled || hit.object == after, point, direction,
@@ -50,6 +50,7 @@ Lobes interface_lobes(Interaction at, ObjectRow body, float bare, out vec3 emitt
     float cosine = cosine_of(at);
     vec3 front = film_over(body.film, bare, cosine, at.ior, at.ior_before);
     emitted = vec3(0.0);
+#if THIN_WALLS
     if (!at.thin_walled) { return smooth_lobes(front); }
     float through = 1.0 / max(refracted_cosine(cosine, at.ior), MIN_THIN_LAYER_COSINE);
     vec3 depth = body.extinction * through;
@@ -57,6 +58,9 @@ Lobes interface_lobes(Interaction at, ObjectRow body, float bare, out vec3 emitt
     emitted = thin_wall_exitance(front, bare, depth) * emitted_radiance(body.emission, body.extinction, through);
 #endif
     return thin_wall_lobes(front, bare, depth);
+#else
+    return smooth_lobes(front);
+#endif
 }
 
 vec3 reflected_at(Interaction at) {

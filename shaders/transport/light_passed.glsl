@@ -30,7 +30,7 @@ vec3 light_passed(vec3 point, vec3 normal, vec3 towards, float distance_m) {
             passed *= found.transmittance;
             ObjectRow body = traced_body(found.object);
             vec3 emitted = vec3(0.0);
-            if (int(body.type) == TYPE_THIN_WALL) { pass_absorber(body, dot(found.face_normal, towards), emitted, passed); }
+            if (is_thin_wall(body)) { pass_absorber(body, dot(found.face_normal, towards), emitted, passed); }
         }
         counted_to = max(found.path, counted_to);
         beyond = found.path + path_within(towards, found.face_normal);

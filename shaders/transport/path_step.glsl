@@ -401,7 +401,7 @@ void follow_to_event(inout Path path, Hit hit, vec2 pixel, ivec2 texel, inout Dr
         return;
     }
     int after = effective_medium(surface.interior);
-    if (int(body.type) != TYPE_THIN_WALL && !alters_light(before, after, CHANNEL)) {
+    if (!is_thin_wall(body) && !alters_light(before, after, CHANNEL)) {
         path.origin = origin_beside(path.origin + surface.path * path.direction, surface.face_normal, path.direction, path.skipped);
         path.interior = surface.interior;
     } else {

@@ -305,7 +305,11 @@ int interact(inout Ray ray, out Ray weaker, Interaction at, ObjectRow body, Hit 
     bool polished = at.roughness == 0.0;
     float alpha = at.roughness * at.roughness;
     Facet facet = take_facet(at, alpha, primary.pixel, depth - 1, ray.branch_code);
+#if ROUGH
     float bare = interface_reflectance(cosine_of(at), at.ior, at.roughness);
+#else
+    float bare = fresnel_dielectric(cosine_of(at), at.ior);
+#endif
     vec3 emitted, refracted = refracted_at(at);
     Lobes lobes = interface_lobes(at, body, bare, emitted);
     mask_lobes(lobes, facet, at, refracted);
@@ -391,7 +395,7 @@ int follow_to_end(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, in
         return NONE;
     }
     int after = effective_medium(surface.interior);
-    if (type != TYPE_THIN_WALL && !alters_light(before, after, channel)) {
+    if (!is_thin_wall(body) && !alters_light(before, after, channel)) {
         return pass_on(ray, ray.origin + surface.path * ray.direction, surface.face_normal, surface.interior, normal);
     }
     Interaction at = interaction_at(surface, body, point, ray.direction, normal, before, after, channel);

@@ -1,10 +1,10 @@
-// Rays of a generation in storage buffers: a record of each, as short as the scene allows, and where it starts, its direction and the
-// pixel that it belongs to, which the CPU reads. Needs ray_step.glsl and first_ray.glsl.
+// Rays of a generation in storage buffers: a record of each, as short as the scene allows, and its segment and the pixel that it
+// belongs to, which the CPU reads. A segment is where it starts, metres skipped, its direction, and its state. Needs ray_step.glsl and first_ray.glsl.
 
-layout(std430, binding = RAYS_BINDING) readonly buffer Rays { uint rays[]; };
-layout(std430, binding = RAY_SEGMENTS_BINDING) readonly buffer RaySegments { float ray_segments[]; };
-layout(std430, binding = BRANCHES_BINDING) writeonly buffer Branches { uint branches[]; };
-layout(std430, binding = BRANCH_SEGMENTS_BINDING) writeonly buffer BranchSegments { float branch_segments[]; };
+layout(std430, binding = RAYS_BINDING) readonly buffer Rays { uvec4 rays[]; };
+layout(std430, binding = RAY_SEGMENTS_BINDING) readonly buffer RaySegments { vec4 ray_segments[]; };
+layout(std430, binding = BRANCHES_BINDING) writeonly buffer Branches { uvec4 branches[]; };
+layout(std430, binding = BRANCH_SEGMENTS_BINDING) writeonly buffer BranchSegments { vec4 branch_segments[]; };
 layout(std430, binding = BRANCH_PIXELS_BINDING) writeonly buffer BranchPixels { uint branch_pixels[]; };
 
 const uint NO_RAY = 0xffffffffu;
@@ -22,25 +22,42 @@ int channel_of(uint word) {
     return int(word >> 30);
 }
 
-uniform int ray_words;   // of a record
+uniform int ray_vectors;  // of four words, of a record
 
-void put(inout int at, uint word) { branches[at++] = word; }
-void put(inout int at, float number) { put(at, floatBitsToUint(number)); }
-void put(inout int at, vec3 vector) { for (int axis = 0; axis < 3; ++axis) { put(at, vector[axis]); } }
+// A record that is written or read word by word, and in memory vector by vector: software rasterizers go there once for each access.
+struct Record {
+    int first;      // vector in memory
+    int words;
+    uvec4 vector;   // the one of the last word
+};
 
-void take(inout int at, out uint word) { word = rays[at++]; }
-void take(inout int at, out float number) { number = uintBitsToFloat(rays[at++]); }
-void take(inout int at, out vec3 vector) { for (int axis = 0; axis < 3; ++axis) { vector[axis] = uintBitsToFloat(rays[at++]); } }
+void put(inout Record record, uint word) {
+    record.vector[record.words & 3] = word;
+    if ((++record.words & 3) == 0) { branches[record.first + (record.words >> 2) - 1] = record.vector; }
+}
+void put(inout Record record, float number) { put(record, floatBitsToUint(number)); }
+void put(inout Record record, vec3 vector) { for (int axis = 0; axis < 3; ++axis) { put(record, vector[axis]); } }
+
+void end_record(Record record) {
+    if ((record.words & 3) != 0) { branches[record.first + (record.words >> 2)] = record.vector; }
+}
+
+void take(inout Record record, out uint word) {
+    if ((record.words & 3) == 0) { record.vector = rays[record.first + (record.words >> 2)]; }
+    word = record.vector[record.words++ & 3];
+}
+void take(inout Record record, out float number) {
+    uint word;
+    take(record, word);
+    number = uintBitsToFloat(word);
+}
+void take(inout Record record, out vec3 vector) { for (int axis = 0; axis < 3; ++axis) { take(record, vector[axis]); } }
 
 void store(int place, Ray ray) {
-    for (int axis = 0; axis < 3; ++axis) {
-        branch_segments[6 * place + axis] = ray.origin[axis];
-        branch_segments[6 * place + 3 + axis] = ray.direction[axis];
-    }
-    int at = ray_words * place;
+    branch_segments[2 * place] = vec4(ray.origin, ray.skipped);
+    branch_segments[2 * place + 1] = vec4(ray.direction, uintBitsToFloat(ray.state));
+    Record at = Record(ray_vectors * place, 0, uvec4(0u));
     put(at, ray.throughput);
-    put(at, ray.state);
-    put(at, ray.skipped);
 #if ONE_OBJECT
     put(at, packed_interior(ray.interior));
 #else
@@ -59,18 +76,18 @@ void store(int place, Ray ray) {
         put(at, ray.footprint.direction[side]);
     }
 #endif
+    end_record(at);
 }
 
 Ray stored_ray(int place) {
     Ray ray = Ray(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(1.0), 0u, 0u, uvec4(0u), vec3(0.0), no_footprint());
-    for (int axis = 0; axis < 3; ++axis) {
-        ray.origin[axis] = ray_segments[6 * place + axis];
-        ray.direction[axis] = ray_segments[6 * place + 3 + axis];
-    }
-    int at = ray_words * place;
+    vec4 start = ray_segments[2 * place], along = ray_segments[2 * place + 1];
+    ray.origin = start.xyz;
+    ray.skipped = start.w;
+    ray.direction = along.xyz;
+    ray.state = floatBitsToUint(along.w);
+    Record at = Record(ray_vectors * place, 0, uvec4(0u));
     take(at, ray.throughput);
-    take(at, ray.state);
-    take(at, ray.skipped);
 #if ONE_OBJECT
     uint count;
     take(at, count);

@@ -23,11 +23,11 @@ vec3 straight_transmittance(vec3 origin, float skipped, uvec4 interior, vec3 tow
         passed *= found.transmittance;
         if (type == TYPE_OPAQUE && (found.outside || body.one_sided == 0.0)) { return vec3(0.0); }
         int after = effective_medium(found.interior);
-        if (type == TYPE_THIN_WALL || alters_light(before, after, channel)) {
-            float ior = type == TYPE_THIN_WALL ? body.ior : index_of(after, channel);
+        if (is_thin_wall(body) || alters_light(before, after, channel)) {
+            float ior = is_thin_wall(body) ? body.ior : index_of(after, channel);
             if (ior != index_of(before, channel)) { return vec3(0.0); }
-            passed *= body.transmission * (type == TYPE_THIN_WALL || found.object == after ? body.color : vec3(1.0));
-            if (type == TYPE_THIN_WALL) {
+            passed *= body.transmission * (is_thin_wall(body) || found.object == after ? body.color : vec3(1.0));
+            if (is_thin_wall(body)) {
                 vec3 emitted = vec3(0.0);
                 pass_absorber(body, -dot(found.face_normal, towards), emitted, passed);
             }

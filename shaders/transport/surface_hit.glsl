@@ -1,6 +1,6 @@
 // Surfaces that a ray hits in one place: of solids, thin walls and opaque objects. Needs <constants>, <Surfaces>, <ObjectRow>,
 // lib/optics.glsl, lib/interface.glsl, hierarchy.glsl and interior_list.glsl. FROM_EYE: rays may start inside bodies, or before
-// others without an interface. ONE_SURFACE: the hit is given, and no surface of another object lies there.
+// others without an interface. THIN_WALLS: some objects are thin walls, or absorb as such. ONE_SURFACE: the hit is given, and no surface of another object lies there.
 
 #if FROM_EYE
 uniform uvec4 start_interior;  // the bodies that the eye is in
@@ -85,6 +85,14 @@ bool alters_light(int before, int after, int channel) {
     return ior != ior_after || !plain;
 }
 
+bool is_thin_wall(ObjectRow body) {
+#if THIN_WALLS
+    return int(body.type) == TYPE_THIN_WALL;
+#else
+    return false;
+#endif
+}
+
 // Thin wall that only absorbs and emits.
 void pass_absorber(ObjectRow wall, float cosine, inout vec3 emitted, inout vec3 throughput) {
     float through = 1.0 / max(refracted_cosine(cosine, wall.ior), MIN_THIN_LAYER_COSINE);
@@ -140,21 +148,26 @@ SurfaceHit surface_hit(vec3 origin, vec3 direction, uvec4 interior, float start,
         int now = effective_medium(found.interior);
         bool altered = alters_light(before, now, channel);
         if (type == TYPE_SOLID) {
+#if THIN_WALLS
             if (rank == 0 && altered) {
                 pass_absorber(traced_body(found.object), -dot(found.face_normal, direction), found.emitted, found.transmittance);
                 rank = -1;
             }
+#endif
             decides = decides || rank < 0 || (rank == 1 && (now == hit.object || (before == hit.object && now != found.object)));
             rank = rank == 0 ? 0 : 1;
         } else if (type == TYPE_OPAQUE && (outside || body.one_sided == 0.0)) {
             decides = true;
             rank = 2;
-        } else if (type == TYPE_THIN_WALL && (rank < 0 || (rank == 1 && !altered))) {
+        }
+#if THIN_WALLS
+        else if (type == TYPE_THIN_WALL && (rank < 0 || (rank == 1 && !altered))) {
             decides = true;
             rank = 0;
         } else if (type == TYPE_THIN_WALL || type == TYPE_ABSORBER) {
             pass_absorber(body, across, found.emitted, found.transmittance);
         }
+#endif
         if (decides) {
             found.object = hit.object;
             found.outside = outside;

@@ -89,9 +89,10 @@ class _EmbreePart:
             # From the middle before anything is multiplied: near a tiny body far from the center little is rounded.
             local, along = self._turned(origins - self.middle), self._turned(directions)
             local *= self.scale
-            ahead = np.zeros(len(local), np.float32)
+            ahead: Floats | float = 0.0
             far = np.flatnonzero(np.einsum("ij,ij->i", local, local) > FAR_AWAY**2)
             if far.size:
+                ahead = np.zeros(len(local), np.float32)
                 speed = np.einsum("ij,ij->i", along[far], along[far])
                 nearest = -np.einsum("ij,ij->i", local[far], along[far]) / speed
                 ahead[far] = np.maximum(nearest - FAR_AWAY / np.sqrt(speed), 0.0)
@@ -178,7 +179,9 @@ class EmbreeHitsCache:
 
 def _chunks(count: int, threads: int) -> list[slice]:
     """Rows of so many rays for each of some threads."""
-    edges = np.linspace(0, count, max(min(threads, count // _LEAST_RAYS), 1) + 1).astype(int).tolist()
+    if (parts := min(threads, count // _LEAST_RAYS)) <= 1:
+        return [slice(0, count)]
+    edges = np.linspace(0, count, parts + 1).astype(int).tolist()
     return [slice(begin, end) for begin, end in pairwise(edges)]
 
 

@@ -156,7 +156,7 @@ class CausticsPass:
         scene = job.scene
         surfaces = [body.surface for body in scene.bodies if body.surface is not None]
         switches: dict[str, bool | int] = {
-            **ray_switches(scene),
+            **ray_switches(job),
             "TEXTURED": job.features.textured,
             "EMISSION": False,
             "FROM_EYE": False,

@@ -279,7 +279,7 @@ def _switches(job: FrameJob) -> dict[str, bool | int]:
     bases = has_bases(scene)
     return {
         "FROM_EYE": job.placed.starts_inside,
-        **ray_switches(scene),
+        **ray_switches(job),
         "TEXTURED": job.features.textured,
         "SCATTER": any(medium.scatters for medium in media),
         "EMISSION": any(medium.emits for medium in media),

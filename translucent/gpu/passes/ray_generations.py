@@ -24,7 +24,7 @@ from translucent.gpu.shaders import set_used
 from translucent.gpu.uniforms import media_center
 
 #: Bytes of the buffers of rays, however large the frame is.
-MOST_BYTES = 64 << 20
+MOST_BYTES = 32 << 20
 
 #: Places for rays to each pixel of a portion that has rays. Live rays fill no more than half of them: about two rays
 #: of a pixel are alive at once, in bodies with many walls three.
@@ -98,7 +98,7 @@ class RayGenerations:
         )
         hierarchies = job.resources.hierarchies.of(job.scene, textured=job.features.textured)
         room = _Room(job, pixels, switches, hierarchies.first_triangles)
-        sizes = {"ray_words": room.words, "end_words": room.end_words, "columns": width}
+        sizes = {"ray_vectors": room.words // 4, "end_words": room.end_words, "columns": width}
         for program in filter(None, programs):
             set_used(program, {**values, **sizes})
         hits = job.resources.ray_hits.of(job.scene, media_center(job.scene))
@@ -175,7 +175,7 @@ class _Room:
         self.words = _words(switches)
         # Words of the record of an end in shaders/transport/stored_ends.glsl.
         self.end_words = 16 + bool(switches["MICROFACETS"]) + 4 * bool(switches["TEXTURED"])
-        branch = 4 * (self.words + 7)
+        branch = 4 * (self.words + 9)
         most = MOST_BYTES // (2 * branch + (_LIVE_BYTES + 8 * self.end_words) // 2)
         self.places = min(self.channels * max(MORE_PLACES * len(pixels), LEAST_PLACES), most)
         self.live = self.places // 2
@@ -183,7 +183,7 @@ class _Room:
         self._rays, self._branches = (
             tuple(
                 storage.get(f"{name} {side}", size * self.places)
-                for name, size in (("records", 4 * self.words), ("segments", 24), ("pixels", 4))
+                for name, size in (("records", 4 * self.words), ("segments", 32), ("pixels", 4))
             )
             for side in range(2)
         )
@@ -256,8 +256,8 @@ class _Room:
         # OpenGL reads no 0 bytes.
         words = np.frombuffer(pixels.read(4 * max(places, 1)), np.uint32)[:places]
         found = np.flatnonzero(words != _NO_RAY)
-        ends = np.frombuffer(segments.read(24 * max(places, 1)), np.float32).reshape(-1, 6).take(found, axis=0)
-        return _Live(found, words.take(found), ends[:, :3], ends[:, 3:])
+        ends = np.frombuffer(segments.read(32 * max(places, 1)), np.float32).reshape(-1, 8).take(found, axis=0)
+        return _Live(found, words.take(found), ends[:, :3], ends[:, 4:7])
 
     def put(self, live: _Live, hits: RayHits) -> tuple[int, int]:
         """Write what rays hit, rays with a hit first, and the lists of the rays of pixels.
@@ -279,16 +279,20 @@ class _Room:
         self._live.write(rows)
         self._numbers = rows[0], rows[2]
         pixels = live.pixels & _PIXEL
-        first = np.concatenate([[0], np.flatnonzero(pixels[1:] != pixels[:-1]) + 1, [len(pixels)]])
-        self._sums.write(np.stack([first, pixels.take(first, mode="clip")], axis=1).astype(np.uint32))
-        return len(found), len(first) - 1
+        changes = np.flatnonzero(pixels[1:] != pixels[:-1]) + 1
+        sums = np.empty((len(changes) + 2, 2), np.uint32)
+        sums[0, 0], sums[1:-1, 0], sums[-1, 0] = 0, changes, len(pixels)
+        sums[:, 1] = pixels.take(sums[:, 0], mode="clip")
+        self._sums.write(sums)
+        return len(found), len(changes) + 1
 
 
 def _words(switches: Mapping[str, bool | int]) -> int:
-    """Words of the record of a ray in ``shaders/transport/stored_rays.glsl``."""
+    """Words of the record of a ray in ``shaders/transport/stored_rays.glsl``, in whole vectors."""
     interior = 1 if switches["ONE_OBJECT"] else 4
     outwards = 3 if switches["LAYERED"] or switches["DIFFUSED"] else 0
-    return 5 + interior + 2 * switches["MICROFACETS"] + outwards + 12 * switches["FOOTPRINTS"]
+    words = 3 + interior + 2 * switches["MICROFACETS"] + outwards + 12 * switches["FOOTPRINTS"]
+    return -(-words // 4) * 4
 
 
 def pixel_words(requested: npt.NDArray[np.bool_], left: int = 0, top: int = 0) -> Pixels:

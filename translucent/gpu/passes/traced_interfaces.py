@@ -53,8 +53,9 @@ _ENTERED = ("entered", "surface_parameters", "surface_color")
 #: Samplers of ``shaders/transport/hierarchy.glsl``, and of the table of objects.
 RAY_SAMPLERS = ("object_table", "hierarchy_nodes", "hierarchy_triangles")
 
-#: Throughput of a ray below which it is not followed, with two forks or fewer.
-FAINTEST_THROUGHPUT = 1.2e-2
+#: Throughput of a ray, its three channels together, below which it is not followed, with two forks or fewer: less than
+#: 1.7 % of the light of each channel, one step of a picture with 8 bits.
+FAINTEST_THROUGHPUT = 3 * 0.017
 
 #: Room around the mirror images of bodies that rough coats blur, in heights of the picture.
 MIRROR_ROOM = 0.06
@@ -227,7 +228,7 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
     return {
         "FORKS": job.plan.interfaces.tree[1] if job.plan.interfaces else 0,
         "FROM_EYE": job.placed.starts_inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
-        **ray_switches(scene),
+        **ray_switches(job),
         "TEXTURED": job.features.textured,
         "EMISSION": job.features.emits and not job.features.scatters,
         "LAYERED": any(treatment_of(body) is Treatment.LAYER for body in scene.bodies),
@@ -295,7 +296,7 @@ def _ground_shadows(job: FrameJob, switches: Mapping[str, bool | int]) -> dict[s
 def faintest_throughput(forks: int) -> float:
     """Throughput of a ray, its three channels together, below which it is not followed.
 
-    With two forks the rays left out weigh as much as those of a third fork; more forks ask for more.
+    More forks ask for fainter rays: a fourth of that for each beyond the second.
     """
     return FAINTEST_THROUGHPUT / 4.0 ** max(forks - 2, 0)
 
@@ -357,13 +358,15 @@ def traced_scene(job: FrameJob, stack: ExitStack) -> tuple[dict[str, moderngl.Te
     return dict(zip(RAY_SAMPLERS, (table, hierarchies.nodes, hierarchies.triangles), strict=True)), values
 
 
-def ray_switches(scene: Scene) -> dict[str, bool]:
-    """Switches of the shaders that follow rays through a scene: how bodies overlap, and whether there is one object."""
+def ray_switches(job: FrameJob) -> dict[str, bool]:
+    """Switches of the shaders that follow rays through a scene: how bodies overlap, and which objects there are."""
+    scene = job.scene
     return {
         "ONE_OBJECT": len(scene.objects) == 1,
         "ONE_SURFACE": len(scene.objects) == 1,
         "PRIORITY": scene.overlap == "priority",
         "UNION": scene.overlap == "union",
+        "THIN_WALLS": bool(job.features.sheets),
     }
 
 
