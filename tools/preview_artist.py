@@ -130,7 +130,7 @@ def bake(a: Artist) -> Waiting:
 
 def save_png(a: Artist) -> Waiting:
     yield from a.panel("Files")
-    yield from a.click("transparent background")
+    yield from a.click("##export.transparent")
     yield from a.click("PNG ...")
     path = a.folder / "view.png"
     yield from a.answer(path)

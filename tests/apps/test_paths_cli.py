@@ -74,6 +74,7 @@ def test_progress_tells_how_long_the_rest_takes(clock: list[float], capsys: pyte
     """Counted from what was done when the first share was known; in a file, a line now and then."""
     tell = ProgressLine("path tracing on a machine")
     shares = {100.0: 0.1, 100.5: 0.15, 110.0: 0.2, 115.0: 0.4, 141.0: 1.0, 150.0: 0.5, 160.0: 0.9}
+    shares |= {191.0: 0.92, 222.0: 0.94, 236.0: 0.96}  # after 31, 31 and 45 s, of 41, 72 and 86 in all
     for now, share in shares.items():
         clock[0] = now
         tell(share)
@@ -81,6 +82,8 @@ def test_progress_tells_how_long_the_rest_takes(clock: list[float], capsys: pyte
     assert lines == [
         "path tracing on a machine: 20%, about 80 s left",
         "path tracing on a machine: 90%, about 2 s left",
+        "path tracing on a machine: 92%, about 8 s left",
+        "path tracing on a machine: 96%, about 7 s left",
     ]
 
 

@@ -21,7 +21,8 @@ from translucent.errors import RenderError, printable
 _KEPT = re.compile(r"(\n|\t|\x1b\[48;2;\d{1,3};\d{1,3};\d{1,3}m {2,8}\x1b\[0m)")
 
 
-#: Seconds before the first line of progress, and between two: in a terminal, and in a file.
+#: Seconds before the first line of progress, and between two: in a terminal, and in a file, where long
+#: work has fewer lines: half as many seconds as have been spent lie between them.
 TERMINAL, FILE = (1.0, 0.5), (10.0, 30.0)
 
 
@@ -107,7 +108,7 @@ class ProgressLine:
                 overwrite("")
                 self._width = 0
             return
-        before, between = TERMINAL if self._terminal else FILE
+        before, between = TERMINAL if self._terminal else (FILE[0], max(FILE[1], 0.5 * spent))
         if fraction <= least or spent < before or (self._reported and now - self._reported < between):
             return
         self._reported = now
