@@ -1,7 +1,7 @@
 // Photons as points of the picture, where it shows the surfaces on which they have landed. What each adds to the irradiance
 // of its pixels is its power, over the area that a pixel covers of the plane in which it lies.
 //
-// Each photon is a square that is as large as some photons take where they land, up to half a pixel wide. Photons start on a
+// Each photon is a square that is as large as some photons take where they land, up to a pixel wide. Photons start on a
 // lattice, and without a width they would show its moire in even light. In a focus they have almost no width. The area that a
 // photon takes there is its footprint (photon differentials, Schjoeth et al. 2007, "Photon differentials"; Frisvad et al. 2014,
 // "Photon differential splatting for rendering caustics"), here from differences to photons that start beside it. Of the two
@@ -25,7 +25,7 @@ flat out vec4 parts;        // of the photon: in its pixel, beside it, above or 
 flat out ivec2 own_texel;
 
 const float STEEPEST_FACE = 0.1;  // sine of the angle between faces of one curved surface within a pixel
-const float WIDEST = 0.5;         // pixels
+const float WIDEST = 1.0;         // pixels
 const vec4 NOWHERE = vec4(2.0, 2.0, 2.0, 1.0);
 
 // Whether a pixel shows the plane of a photon, but for the angle between faces of what is curved. along: metres on the plane

@@ -256,13 +256,13 @@ def test_a_focus_is_as_sharp_as_its_photons(renderer: tl.Renderer, landed: Lande
 
 
 def test_even_light_is_even(renderer: tl.Renderer) -> None:
-    """Through a flat window: photons without width vary twice as much as the bar, by chance half as much again."""
+    """Through a flat window: half as wide photons vary more than the bar, and by chance twice as much."""
     window = tl.Object(Box((-1, 1, -1), (1, 1.2, 1)).tessellate(), tl.Medium(ior=1.9))
     one = scene(window, GROUND, light=tl.DirectionalLight((0.1, -1, 0.06), 1.0), camera=top())
     middle = photons_in(renderer, one, (60, 60), tl.Caustics(5000))[20:40, 20:40, 0]  # 5.6 of a pixel
     mirrored = (0.9 / 2.9) ** 2  # by each face
     assert middle.mean() == pytest.approx((1.0 - mirrored) / (1.0 + mirrored) / np.sqrt(1.0136), rel=0.005)
-    assert middle.std() < 0.11 * middle.mean()
+    assert middle.std() < 0.085 * middle.mean()
 
 
 def test_the_ground_shows_what_lands_on_it(renderer: tl.Renderer, landed: Landed) -> None:

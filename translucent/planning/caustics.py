@@ -36,7 +36,7 @@ class Caustics:
     Fresnel's equations, and those that take the same branches are as even as all; media absorb along the path.
     Refracted or reflected photons land on the first opaque surface, and are drawn into the picture of the opaque
     objects (McGuire & Luebke 2009), each divided by the area that its pixel covers there. Each is a square that takes
-    the space of some photons there, up to half a pixel wide (photon differentials, Schjoeth et al. 2007); where there
+    the space of some photons there, up to a pixel wide (photon differentials, Schjoeth et al. 2007); where there
     are few, they are spread over some pixels. Surfaces reflect them diffusely. The energy is right whatever their
     number; the noise of a pixel falls with its square root. Of several samples of a pixel each follows its part of the
     photons.

@@ -35,7 +35,7 @@ _LANDED = ("landed_point", "landed_power", "landed_normal")
 _RECEIVED = ("photon_irradiance", "opaque_axial_depth", "receiver_normal")
 
 #: Photons of a pixel from which on they stay in it; fewer are spread. Each photon is a square that holds as many as the
-#: first number, up to half a pixel wide. Of polished glass errors of pictures are larger with 8, and with 32 as large;
+#: first number, up to a pixel wide. Of polished glass errors of pictures are larger with 8, and with 32 as large;
 #: rough interfaces blur caustics, and errors are smaller by up to a third with four times as many.
 ENOUGH, ENOUGH_OF_ROUGH = 16.0, 64.0
 
