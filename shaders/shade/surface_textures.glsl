@@ -10,6 +10,7 @@ uniform sampler2D emissive_texture;
 #if OCCLUSION
 uniform sampler2D occlusion_texture;
 #endif
+uniform float texture_bias;     // of the mipmap: a sample is narrower than a pixel
 uniform vec3 texture_rows[12];  // two for each, in this order: coordinates in the picture, v upwards, from (u, v, 1)
 
 const int COLOR_TEXTURE = 0;
@@ -29,10 +30,10 @@ vec2 texture_coordinate(int number, vec2 uv) {
     return vec2(turned.x, 1.0 - turned.y);
 }
 
-vec4 textured_color(vec2 uv) { return texture(color_texture, texture_coordinate(COLOR_TEXTURE, uv)); }
-vec4 textured_roughness(vec2 uv) { return texture(roughness_texture, texture_coordinate(ROUGHNESS_TEXTURE, uv)); }
-float textured_transmission(vec2 uv) { return texture(transmission_texture, texture_coordinate(TRANSMISSION_TEXTURE, uv)).r; }
-vec3 textured_emission(vec2 uv) { return texture(emissive_texture, texture_coordinate(EMISSIVE_TEXTURE, uv)).rgb; }
+vec4 textured_color(vec2 uv) { return texture(color_texture, texture_coordinate(COLOR_TEXTURE, uv), texture_bias); }
+vec4 textured_roughness(vec2 uv) { return texture(roughness_texture, texture_coordinate(ROUGHNESS_TEXTURE, uv), texture_bias); }
+float textured_transmission(vec2 uv) { return texture(transmission_texture, texture_coordinate(TRANSMISSION_TEXTURE, uv), texture_bias).r; }
+vec3 textured_emission(vec2 uv) { return texture(emissive_texture, texture_coordinate(EMISSIVE_TEXTURE, uv), texture_bias).rgb; }
 
 // Fraction of the light of the environment that reaches a point.
 float unoccluded(vec2 uv) {

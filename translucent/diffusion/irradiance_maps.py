@@ -27,8 +27,8 @@ from translucent.diffusion.photons import BATCH, MOST_SURFACES, Photons, PhotonT
 from translucent.diffusion.sides import SurfaceSides, beside, read_sides
 from translucent.scene.scene import Scene
 
-#: Samples on each object, and paths from each: the fit of the volume takes the mean of about 16 samples.
-SAMPLES, RAYS = 2048, 48
+#: Samples on each object, of all together, and paths from each: the fit of the volume takes the mean of about 16.
+SAMPLES, MOST_SAMPLES, RAYS = 2048, 6144, 48
 
 #: Start of paths above the surface, as a fraction of a cell.
 _ABOVE = 1e-4
@@ -120,7 +120,7 @@ def irradiance_maps(scene: Scene, objects: Sequence[int], photons: int = 0) -> d
         corners = own.world_vertices[own.mesh.faces]
         sides = corners[:, 1:] - corners[:, :1]
         area = 0.5 * float(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum())
-        grid = body_grid(own, np.sqrt(3.0 * area / SAMPLES))
+        grid = body_grid(own, np.sqrt(3.0 * area / min(SAMPLES, MOST_SAMPLES // len(objects))))
         samples[i] = _Samples(grid, Pose.of(scene.objects[i].matrix)[0], count + np.arange(len(grid.points)))
         count += len(grid.points)
     gathering = _Gathering(scene, samples, count)

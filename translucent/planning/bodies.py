@@ -28,6 +28,9 @@ MOST_TEXELS = 1 << 24
 #: Opaque objects whose light is found by way of interfaces and of each other, at most: each takes half a second.
 MOST_EXCHANGING = 8
 
+#: Objects of a scene, and faces of all of them, up to which paths between them are traced on the CPU.
+MOST_TRACED, MOST_TRACED_FACES = 64, 1 << 20
+
 #: Diagonal of such an object, in those of the clear bodies, up to which a map shows the shadows on it.
 LARGEST_EXCHANGING = 2.0
 
@@ -52,10 +55,11 @@ def exchanging_objects(scene: Scene) -> tuple[int, ...]:
     Those are objects in clear bodies, and others in such scenes that are no larger. None where too many would be, or
     where paths cannot be traced: through media of varying density, and open meshes.
     """
-    if not (held := held_objects(scene)) or any(
-        body.density is not None or not (body.sheet_thickness is not None or body.mesh.diagnosis.solid)
-        for body in scene.bodies
-    ):
+    faces = sum(len(item.mesh.faces) for item in scene.objects)
+    if len(scene.objects) > MOST_TRACED or faces > MOST_TRACED_FACES or not (held := held_objects(scene)):
+        return ()
+    solids = [body for body in scene.bodies if body.sheet_thickness is None]
+    if any(body.density is not None for body in scene.bodies) or not all(b.mesh.diagnosis.solid for b in solids):
         return ()
     largest = LARGEST_EXCHANGING * max(_diagonal(body) for body in _clear_bodies(scene))
     found = tuple(
