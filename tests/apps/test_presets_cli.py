@@ -60,7 +60,7 @@ def test_the_columns_line_up(run: Run) -> None:
         ("kind", "measured|estimated"),
         ("1 mm", "#"),
         ("thick", "#|-"),
-        ("source", "Jensen|Narasimhan|by eye|by theory"),
+        ("source", "Jensen|Narasimhan|by eye|by theory|by data sheet"),
     ):
         at = head.index(column)
         assert all(re.match(pattern, line[at:]) for line in lines), column
@@ -167,7 +167,8 @@ def test_a_terminal_shows_swatches(run: Run, pretend_a_terminal: Callable[..., N
         assert line.count("#") == (4 if one.medium.scatters else 3)
         assert line.count(f"{ESCAPE}48;2;") == line.count("#") + 6  # slabs on white and black have no room for words
     plain = [re.sub(r"\x1b\[[0-9;]*m", "", line) for line in lines]
-    assert all(re.match("Jensen|Narasimhan|by eye|by theory", line[head.index("source") :]) for line in plain)
+    source = "Jensen|Narasimhan|by eye|by theory|by data sheet"
+    assert all(re.match(source, line[head.index("source") :]) for line in plain)
 
 
 @pytest.mark.parametrize(("variable", "value"), [("NO_COLOR", "1"), ("TERM", "dumb")])
