@@ -22,7 +22,7 @@ LEAST_SPREAD, MOST_SPREAD = 0.5, 2.0
 
 @dataclass(frozen=True, eq=False)
 class EnteringRays:
-    """Rays of one light, or of a part of the environment, that enter a body: one at each sample that it reaches.
+    """Rays of one light, or of the environment, that enter a body, at each sample that they reach.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class EnteringRays:
     entering, mirrored : (k, 3) float64
         Flux that enters, and flux that the surface reflects, in W/m^2.
     from_one : bool
-        True if all come from one light, with one ray at a sample: neighboring rays have about the same direction.
+        True if all come from one light: neighboring rays have about the same direction.
     """
 
     samples: Integers
@@ -43,12 +43,12 @@ class EnteringRays:
     from_one: bool = False
 
 
-def joined_rays(rays: Sequence[EnteringRays]) -> EnteringRays:
-    """All rays of several lights."""
+def joined_rays(rays: Sequence[EnteringRays], *, from_one: bool = False) -> EnteringRays:
+    """All rays of several lights, or of the parts of one."""
     nothing = EnteringRays(np.zeros(0, np.int64), *np.zeros((3, 0, 3)))
     parts = zip(*((ray.samples, ray.directions, ray.entering, ray.mirrored) for ray in (nothing, *rays)), strict=True)
     samples, directions, entering, mirrored = map(np.concatenate, parts)
-    return EnteringRays(samples, directions, entering, mirrored)
+    return EnteringRays(samples, directions, entering, mirrored, from_one)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,12 +92,10 @@ class LateralShift:
 
     def moved(self, values: Sequence[Array], samples: Integers) -> Array:
         """(n, s): values of n quantities (`MOST_SHIFTED` + 1, k), shifted by each number of steps, at samples (k,)."""
-        columns = np.stack(values, axis=2)
-        total = np.zeros((self.step.shape[0], len(values)))
-        total[samples] = columns[-1]
-        for own in columns[-2::-1]:
-            total = self.step @ total
-            total[samples] += own
+        count, total = self.step.shape[0], np.zeros((self.step.shape[0], len(values)))
+        for number in range(MOST_SHIFTED, -1, -1):
+            own = np.stack([np.bincount(samples, value[number], count) for value in values], axis=1)
+            total = self.step @ total + own if number < MOST_SHIFTED else own
         return total.T
 
 
@@ -116,10 +114,14 @@ def _across(directions: Array, normals: Array) -> Array:
 def _step(grid: BodyGrid, samples: Integers, along: Array) -> sparse.csr_array:
     """(s, s): map of a flux at the samples to the flux one distance between samples further along the rays.
 
-    Rays at samples (k,) go `along` the surface (k, 3); samples without a ray take the direction of the nearest one.
-    Each sample interpolates the flux that far back. Rays that spread along the surface bring less.
+    Rays at samples (k,) go `along` the surface (k, 3), several at one sample on average; samples without a ray take the
+    direction of the nearest one. Each sample interpolates the flux that far back. Rays that spread along the surface
+    bring less.
     """
     count, spacing = len(grid.points), float(np.sqrt(grid.area))
+    along = np.stack([np.bincount(samples, part, count) for part in along.T], axis=1)
+    samples = np.flatnonzero(np.bincount(samples, minlength=count))
+    along = along[samples]
     reach = (MOST_SHIFTED + 1) * spacing
     nearest = np.full(count, len(samples))
     nearest[samples] = np.arange(len(samples))

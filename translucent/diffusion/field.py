@@ -45,7 +45,7 @@ from translucent.formulas.diffusion import (
 from translucent.formulas.phase import PhaseFunction
 from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
-from translucent.scene.lights import DirectionalLight, PositionalLight
+from translucent.scene.lights import DirectionalLight, PositionalLight, by_spheres
 from translucent.scene.scene import Light, Object, Scene
 
 #: Values in cells: (6, x, y, z, 3) for each side of a surface, or (2 x, 3 y, z, 3) beside each other.
@@ -332,20 +332,25 @@ class DiffusingBody:
             parts = environment_parts(scene.environment, self.lit.shape.sky.directions, pose.turn, suns=False)
             return self._from_sky(parts, dimming)
 
-        def rays_of(light: Light, stops: RayCaster | None) -> tuple[Array, EnteringRays]:
-            found = from_light(grid, self.lit.casters, light, self._medium.ior, self._interface, dimming, stops)
-            return np.zeros((0, 3)), found
+        def rays_of(lights: Sequence[Light], stops: RayCaster | None) -> tuple[Array, EnteringRays]:
+            casters, ior, interface = self.lit.casters, self._medium.ior, self._interface
+            found = [from_light(grid, casters, light, ior, interface, dimming, stops) for light in lights]
+            return np.zeros((0, 3)), joined_rays(found, from_one=True)
 
         arriving, most = self.lit.arriving, 1 + len(scene.lights) + len(suns)
         entering, bright = kept(arriving, (environment_key(scene.environment), through), sky, most)
         rays, inside = [bright], np.zeros((grid.count, 3))
+        outside = list[Light]()
         for light in scene.lights:
             if isinstance(light, PositionalLight) and (cell := _cell_at(grid, pose, light.position)) >= 0:
                 inside[cell] += 4.0 * np.pi * light.mean_share * np.asarray(light.intensity)
             else:
-                rays.append(kept(arriving, (light_key(light), through), partial(rays_of, light, stops), most)[1])
+                outside.append(light)
+        for lights in by_spheres(outside):
+            key = *map(light_key, lights), through
+            rays.append(kept(arriving, key, partial(rays_of, lights, stops), most)[1])
         for sun in suns:  # photons carry none of its light
-            rays.append(kept(arriving, ("sun", light_key(sun), through), partial(rays_of, sun, None), most)[1])
+            rays.append(kept(arriving, ("sun", light_key(sun), through), partial(rays_of, [sun], None), most)[1])
         if photons is not None:
             entering = entering + flux_of(photons, grid, pose)
         if (patches := self.lit.patches) is not None:

@@ -310,18 +310,26 @@ def with_points(lights: Sequence[Light], most: int) -> tuple[Light, ...]:
 
 def with_whole_spheres(lights: Sequence[Light]) -> tuple[Light, ...]:
     """The lights with one point light at the center of each sphere, of its size, in place of its points."""
-    found: dict[object, Light] = {}
-    for light in lights:
-        key: object = light
+    found = list[Light]()
+    for parts in by_spheres(lights):
+        light = parts[0]
         if isinstance(light, _PointOfSphere) and (radius := light.disc[3]) > 0.0:
             center, size = np.asarray(light.position) + light.disc[:3], (0.0, 0.0, 0.0, radius)
-            key = radius, *np.rint(1e6 * center / radius).tolist()
-            light = _PointOfSphere(center, light.intensity, radius, size)
-            if (known := found.get(key)) is not None:
-                assert isinstance(known, PointLight)
-                light = replace(light, intensity=np.asarray(known.intensity) + np.asarray(light.intensity))
-        found[key] = light
-    return tuple(found.values())
+            power = np.sum([np.asarray(part.intensity) for part in parts if isinstance(part, PointLight)], axis=0)
+            light = _PointOfSphere(center, power, radius, size)
+        found.append(light)
+    return tuple(found)
+
+
+def by_spheres(lights: Sequence[Light]) -> list[list[Light]]:
+    """The lights, each alone, but the points of each sphere together."""
+    found: dict[object, list[Light]] = {}
+    for light in lights:
+        key: object = id(light)
+        if isinstance(light, _PointOfSphere) and (radius := light.disc[3]) > 0.0:
+            key = radius, *np.rint(1e6 * (np.asarray(light.position) + light.disc[:3]) / radius).tolist()
+        found.setdefault(key, []).append(light)
+    return list(found.values())
 
 
 def _unit(value: npt.ArrayLike) -> Array:
