@@ -45,6 +45,9 @@ _NO_RAY, _PIXEL = np.uint32(0xFFFFFFFF), np.uint32(0x3FFFFFFF)
 #: Columns and rows of pixels, in words: see `pixel_words`.
 Pixels: TypeAlias = npt.NDArray[np.uint32]
 
+#: Sums over the samples of a pixel, each with its place for its image unit.
+_SUMMED = "summed_light", "summed_spread"
+
 #: Columns and rows of a block of pixels, whose rays are computed together.
 _BLOCK = 4, 2
 
@@ -57,14 +60,19 @@ class RayGenerations:
     gl : moderngl.Context
     samplers : sequence of str
         Names of the samplers of ``shaders/transport/ray_step.glsl``, each with its place for its texture unit.
+    straight : sequence of str
+        Those of ``shaders/transport/shaded_pixel.glsl``, which come after them.
     """
 
-    def __init__(self, gl: moderngl.Context, samplers: Sequence[str]) -> None:
+    def __init__(self, gl: moderngl.Context, samplers: Sequence[str], straight: Sequence[str]) -> None:
         units = {name: unit for unit, name in enumerate(samplers)}
         self._begin = ComputeVariants(gl, "transport/begin_rays.comp", **units)
         self._step = ComputeVariants(gl, "transport/step_rays.comp", **units)
         self._shade = ComputeVariants(gl, "transport/shade_ends.comp", **units)
         self._sum = ComputeVariants(gl, "transport/sum_ray_light.comp")
+        units |= {name: unit for unit, name in enumerate(straight, len(samplers))}
+        images = {name: unit for unit, name in enumerate(_SUMMED)}
+        self._add = ComputeVariants(gl, "transport/add_samples.comp", **units, **images)
 
     def trace(
         self,
@@ -112,6 +120,27 @@ class RayGenerations:
             if parts > 1:
                 assert len(portion) > 1
                 waiting += _parts(portion, parts)[::-1]
+
+    def add(
+        self,
+        job: FrameJob,
+        sums: moderngl.Framebuffer,
+        pixels: Pixels,
+        switches: Mapping[str, bool | int],
+        values: Mapping[str, Any],
+    ) -> None:
+        """Add a sample of the pixels whose rays were traced last to their sums; arguments as for `trace`."""
+        if not len(pixels):
+            return
+        program = self._add.program(**switches, GENERATIONS=True)
+        set_used(program, {**values, "pixel_count": len(pixels)})
+        listed = job.resources.rays.get("first_pixels", pixels.nbytes)
+        listed.bind_to_storage_buffer(STORAGE_BINDINGS["first_pixels"])
+        for unit, texture in enumerate(sums.color_attachments):
+            texture.bind_to_image(unit, read=True, write=True)
+        job.gl.memory_barrier()
+        self._add.run(program, len(pixels))
+        job.gl.memory_barrier()  # what is drawn next reads the sums
 
     def _trace_portion(self, portion: range, room: _Room, hits: EmbreeHits, programs: _Programs) -> int:
         """Trace the rays of some of the pixels; returns into how many parts to divide these, 1 if that is done."""

@@ -47,7 +47,8 @@ _RAY_SAMPLERS = (
     "shadow_ends",
     "ground_shadows",
 )
-_SAMPLERS = *_RAY_SAMPLERS, "emitted_radiance_sum", "straight_transmittance"
+_STRAIGHT = "emitted_radiance_sum", "straight_transmittance"
+_SAMPLERS = *_RAY_SAMPLERS, *_STRAIGHT
 _ENTERED = ("entered", "surface_parameters", "surface_color")
 
 #: Samplers of ``shaders/transport/hierarchy.glsl``, and of the table of objects.
@@ -78,7 +79,7 @@ class TracedInterfacesPass:
         files = "geometry/fullscreen.vert", "transport/traced_interfaces.frag"
         self._variants = Variants(gl, *files, *_SAMPLERS)
         self._with_sums = Variants(gl, *files, *_SAMPLERS, version=SHADER_STORAGE)
-        self._generations = RayGenerations(gl, _RAY_SAMPLERS)
+        self._generations = RayGenerations(gl, _RAY_SAMPLERS, _STRAIGHT)
         self._no_interface = NoInterface(gl)
         self._where_unsettled = Variants(
             gl, "geometry/fullscreen.vert", "transport/where_unsettled.frag", "entered", "unsettled"
@@ -99,9 +100,9 @@ class TracedInterfacesPass:
         gl.enable_only(blending)
         mirror = job.mirror
         if not any(record):
-            if job.bending:
+            if job.bending and job.plan.hits != "embree":
                 self._mark_unsettled(job)
-            else:
+            elif not job.bending:
                 self._no_interface.draw(job, framebuffer, blending)
             if not job.covered or (job.bent_apart and not job.bending):
                 return
@@ -162,7 +163,11 @@ class TracedInterfacesPass:
         for row in range(part.bottom, part.top, max(rows, 1)):
             band, own = part.rows(row, row + rows), {**values, "summed_row": row}
             if by_generations:
-                self._generations.trace(job, band, _pixels(job, band, mask), switches, own)
+                pixels = _pixels(job, band, mask)
+                self._generations.trace(job, band, pixels, switches, own)
+                if job.bending:
+                    self._generations.add(job, framebuffer, pixels, switches, own)
+                    continue
             program = variants.program(**switches, GENERATIONS=by_generations)
             set_used(program, own)
             variants.draw_part(band, program, framebuffer)
