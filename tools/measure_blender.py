@@ -42,7 +42,7 @@ ABSENT = (
 
 #: Pixels along a side; samples of a pixel with a seed in Cycles; paths of one in a round of ours, the
 #: relative standard error at which there are enough, and the seconds.
-SIDE, SAMPLES, PATHS, ENOUGH, SECONDS = 32, 128, 64, 0.005, 30.0
+SIDE, SAMPLES, PATHS, ENOUGH, SECONDS = 32, 512, 64, 0.002, 30.0
 
 #: Columns are the axes of glTF in Blender.
 AXES = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
