@@ -57,8 +57,8 @@ def bear_of_wax() -> tl.Object:
     return tl.Object(bear, tl.Medium(absorption=(60, 130, 320), scattering=(1000, 900, 700), anisotropy=0.3))
 
 
-#: Mean radiance of the picture below by Mitsuba, whose standard error is 0.3 % and 1 %, for two lights.
-LIT_FROM_BEHIND = {(0.35, -0.35, 0.87): (0.00688, 0.00502, 0.00282), (0.0, 0.0, 1.0): (0.00338, 0.00228, 0.00112)}
+#: Mean radiance of the picture below by Mitsuba, whose standard error is 0.6 % at most, for two lights.
+LIT_FROM_BEHIND = {(0.35, -0.35, 0.87): (0.00688, 0.00502, 0.00282), (0.0, 0.0, 1.0): (0.00344, 0.00233, 0.00115)}
 
 
 @pytest.mark.parametrize("direction", LIT_FROM_BEHIND)
