@@ -447,14 +447,16 @@ def _sky_rays(
     """
     count, least = np.diff(first, append=len(received)), np.minimum.reduceat(radiances, first, axis=1)
     total = np.zeros(len(received) + 1)
-    np.cumsum(received * (radiances.sum(axis=0) - np.repeat(least.sum(axis=0), count)), out=total[1:])
+    np.cumsum(received * (sum(radiances) - np.repeat(sum(least), count)), out=total[1:])
     begin, end = first[:, None], (first + count)[:, None]
     levels = total[begin] + (total[end] - total[begin]) * (np.arange(SKY_RAYS + 1) / SKY_RAYS)
     chosen, between = levels[:, :-1] + shifts[:, None] * np.diff(levels), levels[:, 1:-1]
     pairs = np.searchsorted(total, np.concatenate([chosen, between], axis=1), "right") - 1
     pairs, cut = np.split(np.clip(pairs, begin, end - 1), [SKY_RAYS], axis=1)
     # Sums from each pair that two rays share to the next; and the part of that pair that is the earlier ray's.
-    starts, given = np.concatenate([begin, cut], axis=1), np.stack([received, *(received * radiances)])
+    starts, given = np.concatenate([begin, cut], axis=1), np.empty((4, len(received)))
+    given[0] = received
+    np.multiply(received, radiances, out=given[1:])
     sums = np.add.reduceat(given, starts.ravel(), axis=1).reshape(4, *starts.shape)
     sums[:, np.diff(starts, append=end) == 0] = 0.0
     uniform = sums[0].sum(axis=1)
