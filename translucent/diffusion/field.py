@@ -29,12 +29,13 @@ from translucent.diffusion.grid import BodyGrid
 from translucent.diffusion.keys import dimming_key, environment_key, kept, light_key, may_dim
 from translucent.diffusion.lit_body import LitBody
 from translucent.diffusion.photons import EnteringPhotons
-from translucent.diffusion.sides import REACH, beside, read_sides
+from translucent.diffusion.sides import beside, read_sides
 from translucent.diffusion.solution import BodySystem, DiffuseSolution
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, exit_quadrature
 from translucent.formulas.diffusion import (
     LEAST_COSINE,
+    SAMPLE_REACH,
     UNIFORM_COSINE,
     emergent_radiance,
     first_events_excess,
@@ -187,7 +188,7 @@ class DiffusionField:
         depth = ((1.0 - self.ahead) * optical_depth).mean(axis=1)
         level = directions - np.einsum("ki,ki->k", directions, normals)[:, None] * normals
         along = level * (path * last_event_fraction(depth))[:, None]
-        most = REACH * self.step
+        most = SAMPLE_REACH * self.step
         return np.asarray(points + along * (most / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), most)))
 
     def scattered_radiance(self, points: Array, normals: Array, directions: Array, cosine: Array) -> Array:

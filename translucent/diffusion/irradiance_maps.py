@@ -23,7 +23,7 @@ from translucent.diffusion.entering import Pose, dimming_bodies, light_passed, w
 from translucent.diffusion.exchange import ROUNDS, OpaqueSurfaces, cosine_directions, direct_irradiance, hemispheres
 from translucent.diffusion.grid import BodyGrid, body_grid, nearest_samples
 from translucent.diffusion.lit_body import own_frame
-from translucent.diffusion.photons import BATCH, MOST_SURFACES, Photons, PhotonTracer, joined
+from translucent.diffusion.photons import BATCH, MOST_SURFACES, Photons, PhotonSegmentTracer, joined
 from translucent.diffusion.sides import SurfaceSides, beside, read_sides
 from translucent.scene.scene import Scene
 
@@ -134,7 +134,7 @@ class _Gathering:
 
     def __init__(self, scene: Scene, samples: dict[int, _Samples], count: int) -> None:
         self.scene, self.samples, self.count = scene, samples, count
-        self.tracer = PhotonTracer(scene, np.random.default_rng(0))
+        self.tracer = PhotonSegmentTracer(scene, np.random.default_rng(0))
         self.surfaces = OpaqueSurfaces(scene.opaque)
         self.dimming = dimming_bodies(scene, -1)
         self.points = np.concatenate([own.points for own in samples.values()])

@@ -131,7 +131,7 @@ def photon_segments(scene: Scene, photons: int, seed: int) -> Iterator[PhotonSeg
     seed : int
         Of the random numbers.
     """
-    for step in PhotonTracer(scene, np.random.default_rng((seed, 0x6D656469))).steps(photons):
+    for step in PhotonSegmentTracer(scene, np.random.default_rng((seed, 0x6D656469))).steps(photons):
         yield step.segments
 
 
@@ -156,7 +156,7 @@ class PhotonStep(NamedTuple):
     left: Photons
 
 
-class PhotonTracer:
+class PhotonSegmentTracer:
     """Tracer of photons through one scene.
 
     Parameters

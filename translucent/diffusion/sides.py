@@ -20,12 +20,13 @@ from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask
 from translucent.diffusion.grid import BodyGrid
+from translucent.formulas.diffusion import SAMPLE_REACH
 
 #: Directions: two along each axis.
 SIDES = 6
 
-#: Samples around a cell that it fits, at most, and their distance in cells.
-AROUND, REACH = 32, 2.0
+#: Samples around a cell that it fits, at most.
+AROUND = 32
 
 #: Cosine between a sample's normal and the plane of a side, above which it counts there: what looks hardly aside does.
 _ASIDE = -0.1
@@ -69,12 +70,12 @@ class SurfaceSides:
         centers = np.stack(np.unravel_index(cells, shape), axis=1) + 0.5
         points = (grid.points - grid.cells.low) / step
         count = min(AROUND, len(points))
-        distance, sample = cKDTree(points).query(centers, count, distance_upper_bound=REACH)
+        distance, sample = cKDTree(points).query(centers, count, distance_upper_bound=SAMPLE_REACH)
         distance, sample = distance.reshape(-1, count), np.asarray(sample).reshape(-1, count)
         areas, face_normals = grid.areas.astype(np.float32), grid.face_normals.astype(np.float32)
         rows = []
         for part in np.array_split(np.arange(len(cells)), len(cells) // _TOGETHER + 1):
-            near = np.where(np.isfinite(distance[part]), (1.0 - (distance[part] / REACH) ** 2) ** 2, 0.0)
+            near = np.where(np.isfinite(distance[part]), (1.0 - (distance[part] / SAMPLE_REACH) ** 2) ** 2, 0.0)
             own = np.where(near > 0.0, sample[part], 0)
             offset = (points[own] - centers[part, None]).astype(np.float32)
             rows.append(_rows(near.astype(np.float32) * areas[own], offset, face_normals[own], own))

@@ -20,6 +20,9 @@ from translucent.formulas.phase import AHEAD_EVENTS, LEAST_POWER, henyey_greenst
 #: within 40 degrees, as after one to three events with g = .8.
 IN_SCATTERED_ROUGHNESS = 0.8
 
+#: Distance in cells up to which a sample of a surface counts for a cell.
+SAMPLE_REACH = 2.0
+
 #: Least cosine of entering light with the normal, inside.
 LEAST_COSINE = 0.05
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import get_args
 
 from translucent.diffusion.environment_ahead import DEPTHS, HEIGHT, WIDTH
-from translucent.diffusion.sides import REACH
 from translucent.formulas.bsdf import TABLE_SIZE
 from translucent.formulas.color import LUMINANCE_WEIGHTS
 from translucent.formulas.diffusion import (
@@ -14,6 +13,7 @@ from translucent.formulas.diffusion import (
     IN_SCATTERED_ROUGHNESS,
     LEAST_COSINE,
     LEAST_EVENT_DEPTH,
+    SAMPLE_REACH,
 )
 from translucent.formulas.interface import CLEARCOAT_IOR
 from translucent.formulas.optics import MIN_THIN_LAYER_COSINE
@@ -156,7 +156,7 @@ CONSTANTS: dict[str, str] = {
     "HARMONIC_2_ZONAL": repr(BAND_2_ZONAL),
     "LEAST_ENTERING_COSINE": repr(LEAST_COSINE),
     "LEAST_EVENT_DEPTH": repr(LEAST_EVENT_DEPTH),
-    "MOST_BESIDE": repr(REACH),
+    "MOST_BESIDE": repr(SAMPLE_REACH),
     "AZIMUTHS": repr(AZIMUTHS),
     "CLEARCOAT_IOR": repr(CLEARCOAT_IOR),
     "GROUND_TOLERANCE": repr(TOLERANCE),
