@@ -60,8 +60,8 @@ def pictures() -> dict[str, bytes]:
     """JPEG of each preset in daylight, by its name, cut from the contact sheets."""
     found = {}
     (width, height), column = preset_sheets.TILE, preset_sheets.STAGES.index("daylight")
-    for name, source in preset_sheets.SHEETS.items():
-        some = [one for one in tl.presets().values() if one.source.startswith(source)]
+    for name, sources in preset_sheets.SHEETS.items():
+        some = [one for one in tl.presets().values() if one.source.startswith(sources)]
         with Image.open(preset_sheets.FOLDER / f"{name}.jpg") as sheet:
             for i, preset in enumerate(some):
                 left, top = preset_sheets.corner(i)

@@ -26,8 +26,12 @@ TILES = ROOT / "out" / "presets"
 #: The columns of each preset.
 STAGES = ("studio", "daylight", "night")
 
-#: Sheets, and whose presets are on them.
-SHEETS = {"jensen": "Jensen et al. 2001", "narasimhan": "Narasimhan et al. 2006", "estimated": "by eye"}
+#: Sheets, and how the sources of the presets on them begin.
+SHEETS = {
+    "jensen": ("Jensen et al. 2001",),
+    "narasimhan": ("Narasimhan et al. 2006",),
+    "estimated": ("by eye", "by data sheet"),
+}
 
 #: Pixels of a tile, of the line of a name, and between presets; presets in a row; quality of the JPEG.
 TILE, NAME, GAP = (160, 100), 18, 8
@@ -89,8 +93,8 @@ def main(names: list[str]) -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
     TILES.mkdir(parents=True, exist_ok=True)
     with tl.Renderer() as renderer:
-        for name, source in SHEETS.items():
-            some = [one for one in tl.presets().values() if one.source.startswith(source)]
+        for name, sources in SHEETS.items():
+            some = [one for one in tl.presets().values() if one.source.startswith(sources)]
             sheet_of(renderer, some, named).save(FOLDER / f"{name}.jpg", quality=QUALITY, optimize=True)
 
 
