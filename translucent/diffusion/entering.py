@@ -21,7 +21,7 @@ from translucent.diffusion.photons import EnteringPhotons
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import DiffuseInterface, diffuse_interface
 from translucent.formulas.interface import refracted_direction
-from translucent.geometry.ray_caster import RayCaster, ray_caster_of
+from translucent.geometry.ray_caster import RayCaster, dot, ray_caster_of, unit
 from translucent.scene.environment import Environment
 from translucent.scene.environment_map import EnvironmentMap, row_solid_angles, texel_directions
 from translucent.scene.lights import DirectionalLight, PositionalLight
@@ -29,6 +29,9 @@ from translucent.scene.scene import Light, Object, Scene
 
 #: Faces of one body on a line that are looked for.
 MOST_FACES = 64
+
+#: Squared radius of a ball that has all of a mesh in it, in units of half the diagonal of its box, with rounding.
+_BALL = 1.0 + 1e-6
 
 
 def dimming_bodies(scene: Scene, body: int) -> list[Object]:
@@ -95,17 +98,18 @@ def _crossings(body: Object, points: Array, directions: Array) -> tuple[Integers
     caster = ray_caster_of(mesh)
     into = np.linalg.inv(body.matrix[:3, :3])
     origins, local_directions = (points - body.matrix[:3, 3]) @ into.T, directions @ into.T
-    unit = local_directions / np.linalg.norm(local_directions, axis=1, keepdims=True)
-    line, face = caster.candidates(
-        (origins - caster.center) / caster.radius,
-        unit,
-        np.full(len(points), MOST_FACES),
-        np.ones(len(mesh.faces), dtype=bool),
+    places, towards = (origins - caster.center) / caster.radius, unit(local_directions)
+    # Most lines pass the ball around the body.
+    along, square = dot(places, towards), dot(places, places)
+    near = np.flatnonzero((square - along**2 <= _BALL) & ((along < 0.0) | (square <= _BALL)))
+    of, face = caster.candidates(
+        places[near], towards[near], np.full(len(near), MOST_FACES), np.ones(len(mesh.faces), dtype=bool)
     )
+    line = near[of]
     first, second, third = (mesh.vertices[mesh.faces[face, corner]] for corner in range(3))
     normal = np.cross(second - first, third - first)
-    slope = (local_directions[line] * normal).sum(axis=1)
-    reached = ((first - origins[line]) * normal).sum(axis=1) / np.where(slope == 0.0, np.inf, slope)
+    slope = dot(local_directions[line], normal)
+    reached = dot(first - origins[line], normal) / np.where(slope == 0.0, np.inf, slope)
     ahead = reached > 0.0
     # Inside a body as often as faces ahead are exits, less entries; each that is passed changes that.
     sign = np.sign(slope)[ahead] * (-1.0 if mesh.diagnosis.inverted else 1.0)
@@ -200,11 +204,11 @@ class Occluders:
     def nearest(self, origins: Array, directions: Array) -> tuple[Array, Array]:
         """Distance in metres at which rays (k, 3), (k, 3) hit the body, and at which anything opaque; inf for none."""
         into = np.linalg.inv(self.body.matrix)
-        rays = origins @ into[:3, :3].T + into[:3, 3], directions @ into[:3, :3].T
-        own = ray_caster_of(self.body.mesh).nearest(*rays)[1]
+        rays, number = (origins @ into[:3, :3].T + into[:3, 3], directions @ into[:3, :3].T), np.arange(len(origins))
+        own = ray_caster_of(self.body.mesh).distances(*rays, number, number).astype(np.float64)
         if self.opaque is None:
             return own, np.full(len(origins), np.inf)
-        return own, self.opaque.caster.nearest(origins, directions)[1]
+        return own, self.opaque.caster.distances(origins, directions, number, number).astype(np.float64)
 
 
 def opaque_surfaces(objects: Sequence[Object]) -> OpaqueSurfaces | None:
@@ -486,15 +490,14 @@ def from_light(
     all_normals, face_normals = pose.outwards(grid.normals), pose.outwards(grid.face_normals)
     if isinstance(light, PositionalLight):
         towards = np.asarray(light.position) - points
-        distance = np.linalg.norm(towards, axis=1)
+        distance = np.sqrt(dot(towards, towards))
         direction = towards / np.maximum(distance, 1e-18)[:, None]
         depth, gain = _spread(towards, face_normals, grid.area)
     else:
         direction = np.broadcast_to(-np.asarray(light.direction), points.shape)
         distance = np.full(len(points), np.inf)
         depth, gain = np.zeros(len(points)), np.ones(len(points))
-    cosine = (direction * all_normals).sum(axis=1)
-    lit = np.flatnonzero((cosine > 0.0) & ((direction * face_normals).sum(axis=1) > 0.0))
+    lit = np.flatnonzero((dot(direction, all_normals) > 0.0) & (dot(direction, face_normals) > 0.0))
     start = points[lit] + BEFORE * grid.cells.step * face_normals[lit]
     nearest = np.minimum(*casters.nearest(start, direction[lit]))
     if stops is not None:
@@ -505,8 +508,8 @@ def from_light(
     sunk = depth[lit, None] * face_normals[lit]
     if depth[lit].any():
         towards = distance[lit, None] * towards + sunk
-        towards /= np.linalg.norm(towards, axis=1)[:, None]
-    reflected = optics.fresnel_dielectric(np.maximum((towards * normals).sum(axis=1), 0.0), ior)[:, None]
+        towards = unit(towards)
+    reflected = optics.fresnel_dielectric(np.maximum(dot(towards, normals), 0.0), ior)[:, None]
     # What a rough interface loses, of any light as of uniform light.
     relative = interface.entering / diffuse_interface(ior).entering
     flux = np.asarray(light.irradiance_on(points[lit] - sunk, normals), np.float64) * gain[lit, None]
@@ -525,7 +528,9 @@ def _spread(towards: Array, face_normals: Array, area: float) -> tuple[Array, Ar
     `_REACH`.
     """
     width = _WIDTH * np.sqrt(area / np.pi)
-    height = (towards * face_normals).sum(axis=1)
+    if dot(towards, towards).min(initial=np.inf) > (1.0 + _REACH**2) * width**2:
+        return np.zeros(len(towards)), np.ones(len(towards))
+    height = dot(towards, face_normals)
     across = np.linalg.norm(towards - height[:, None] * face_normals, axis=1)
     near = (height > 0.0) & (height < width) & (across < _REACH * width)
     within = 1.0 - height / np.hypot(height, _REACH * width)

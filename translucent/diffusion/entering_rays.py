@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from translucent.arrays import Array, Integers
+from translucent.arrays import Array, Floats, Integers
 from translucent.diffusion.grid import BodyGrid
 
 #: Largest shift of first events along the surface, in distances between samples; and number of samples that shifted
@@ -83,13 +83,6 @@ class LateralShift:
         chord = grid.chords(ray.samples, ray.directions) if matched else np.full(len(level), np.inf)
         return cls(_step(grid, ray.samples, along), level / spacing, chord)
 
-    def fractions(self, lengths: Array, weights: Array) -> Array:
-        """(`MOST_SHIFTED` + 1, k): fractions shifted by each number of steps, of path lengths (q, k) in m."""
-        place = lengths * self.level
-        # Each length is shared between the two numbers around it: what goes on from each number to the next one.
-        onward = [(weights * np.clip(place - number, 0.0, 1.0)).sum(axis=0) for number in range(MOST_SHIFTED)]
-        return -np.diff([weights.sum(axis=0), *onward, np.zeros_like(self.level)], axis=0)
-
     def moved(self, values: Sequence[Array], samples: Integers) -> Array:
         """(n, s): values of n quantities (`MOST_SHIFTED` + 1, k), shifted by each number of steps, at samples (k,)."""
         count, total = self.step.shape[0], np.zeros((self.step.shape[0], len(values)))
@@ -97,6 +90,19 @@ class LateralShift:
             own = np.stack([np.bincount(samples, value[number], count) for value in values], axis=1)
             total = self.step @ total + own if number < MOST_SHIFTED else own
         return total.T
+
+
+def shifted_fractions(places: Floats, *weights: Floats) -> list[Floats]:
+    """(`MOST_SHIFTED` + 1, k) each: fractions of events at `places` (q, k) shifted by each number of steps.
+
+    The first are of events that all count alike, the next of events with weights (q, k).
+    """
+    # Each place is shared between the two numbers around it: what goes on from each number to the next one.
+    onward = [np.clip(places - np.float32(number), 0.0, 1.0) for number in range(MOST_SHIFTED)]
+    every = [np.mean(part, axis=0) for part in onward]
+    sums = [(np.ones_like(every[0]), every)]
+    sums += [(weight.sum(axis=0), [np.einsum("qk,qk->k", weight, part) for part in onward]) for weight in weights]
+    return [-np.diff([whole, *parts, np.zeros_like(whole)], axis=0) for whole, parts in sums]
 
 
 def moved_along(values: Sequence[Array], samples: Integers, count: int, shift: LateralShift | None) -> Array:

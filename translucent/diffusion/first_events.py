@@ -17,7 +17,7 @@ from scipy import sparse
 
 from translucent.arrays import Array, Floats, Integers
 from translucent.diffusion.densities import Densities
-from translucent.diffusion.entering_rays import EnteringRays, LateralShift, moved_along
+from translucent.diffusion.entering_rays import MOST_SHIFTED, EnteringRays, LateralShift, moved_along, shifted_fractions
 from translucent.diffusion.grid import BodyGrid, box_points
 from translucent.diffusion.walls import SlabSolution
 from translucent.formulas import optics
@@ -54,6 +54,9 @@ _LEAST_ALBEDO = 1e-6
 
 #: Number of path lengths for the first events of a ray that are shifted along the surface.
 SHIFTED_PARTS = 4
+
+#: Rays whose shifts are found at a time.
+_TOGETHER = 1 << 13
 
 #: Cosines of light inside with the normal between which what half-spaces reflect of it is interpolated.
 _COSINES = np.linspace(0.0, 1.0, 513)
@@ -421,25 +424,38 @@ class FirstEvents:
 
     def _fractions(
         self, shift: LateralShift, samples: Integers, cosine: Array, metres: Array
-    ) -> tuple[Array, Array, Array]:
-        """`LateralShift.fractions` of all events, of their light at the surface, and of what cells receive."""
-        depth, extinction = self._layer.depth[samples], self._extinction
-        k = np.broadcast_to(self._layer.attenuation, self._layer.depth.shape)[samples]
-        chord = shift.chord / np.where(metres > 0.0, metres, 1.0)
-        parts = (np.arange(SHIFTED_PARTS)[:, None] + 0.5) / SHIFTED_PARTS
-        even = np.full((SHIFTED_PARTS, len(samples)), 1.0 / SHIFTED_PARTS)
-        every, layered = (optics.opacity(extinction * np.minimum(chord, limit)) for limit in (np.inf, depth / cosine))
-        inside = layered / np.maximum(optics.opacity(extinction * depth / cosine), np.finfo(np.float64).tiny)
-        lengths, shallow = (-np.log1p(-parts * part) / extinction for part in (every, layered))
-        # Near the depth of reading events say little of the fluence at the surface.
-        rest = np.maximum(depth - cosine * shallow, 1e-6 * depth)
-        near = rest * optics.mean_transmittance(2.0 * k * rest) * np.exp(k * (rest - depth))
-        near /= np.maximum(near.sum(axis=0), np.finfo(np.float64).tiny)
-        return (
-            shift.fractions(lengths * metres, every * even),
-            shift.fractions(shallow * metres, inside * near),
-            shift.fractions(shallow * metres, inside * even),
-        )
+    ) -> tuple[Floats, Floats, Floats]:
+        """`LateralShift.fractions` of all events, of their light at the surface, and of what cells receive.
+
+        In single precision, and in parts that stay in the processor's cache: lights of some size have many rays.
+        """
+        found = np.empty((3, MOST_SHIFTED + 1, len(samples)), np.float32)
+        k = np.broadcast_to(self._layer.attenuation, self._layer.depth.shape)
+        for start in range(0, len(samples), _TOGETHER):
+            of = slice(start, start + _TOGETHER)
+            given = self._layer.depth[samples[of]], k[samples[of]], cosine[of], metres[of], shift.chord[of]
+            found[..., of] = self._fractions_of(shift.level[of], *(part.astype(np.float32) for part in given))
+        return found[0], found[1], found[2]
+
+    def _fractions_of(
+        self, level: Array, depth: Floats, k: Floats, cosine: Floats, metres: Floats, chord: Floats
+    ) -> tuple[Floats, Floats, Floats]:
+        """`_fractions` of some rays (k,)."""
+        tiny, extinction = np.finfo(np.float32).tiny, np.float32(self._extinction)
+        parts = (np.arange(SHIFTED_PARTS, dtype=np.float32)[:, None] + np.float32(0.5)) / np.float32(SHIFTED_PARTS)
+        slant = depth / cosine
+        end = chord / np.where(metres > 0.0, metres, np.float32(1.0))
+        every, layered = (-np.expm1(-extinction * np.minimum(end, limit)) for limit in (np.float32(np.inf), slant))
+        inside = layered / np.maximum(-np.expm1(-extinction * slant), tiny)
+        long, shallow = (-np.log1p(-parts * part) / extinction for part in (every, layered))
+        # Near the depth of reading events say little of the fluence at the surface: as sinh(k rest) says.
+        rest = np.maximum(depth - cosine * shallow, np.float32(1e-6) * depth)
+        k = np.maximum(k, np.float32(1e-3) / (depth + tiny))
+        near = np.exp(k * (rest - depth)) * -np.expm1(-np.float32(2.0) * k * rest)
+        near /= np.maximum(near.sum(axis=0), tiny)
+        steps = level.astype(np.float32) * metres
+        (all_events,), layer = shifted_fractions(steps * long), shifted_fractions(steps * shallow, near)
+        return every * all_events, inside * layer[1], inside * layer[0]
 
 
 @lru_cache(maxsize=16)

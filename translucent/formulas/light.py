@@ -37,7 +37,7 @@ def cone_attenuation(travel: npt.ArrayLike, cone: npt.ArrayLike) -> Array:
     axis = cone[..., :3]
     with np.errstate(under="ignore"):
         apart = np.linalg.norm(axis, axis=-1, keepdims=True) * np.asarray(travel, dtype=np.float64) - axis
-        level = np.clip(cone[..., 3] - (apart**2).sum(axis=-1), 0.0, 1.0)
+        level = np.clip(cone[..., 3] - np.einsum("...i,...i->...", apart, apart), 0.0, 1.0)
         return np.asarray(level * level)
 
 

@@ -78,9 +78,9 @@ class PositionalLight(Frozen):
         reach = np.maximum(np.abs(towards).max(axis=-1, keepdims=True), np.finfo(np.float64).tiny)
         with np.errstate(over="ignore", under="ignore"):
             scaled = towards / reach
-            length = np.linalg.norm(scaled, axis=-1, keepdims=True)
+            length = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))[..., None]
             length = np.where(length > 0, length, 1.0)
-            cosine = np.maximum(np.sum(scaled * np.asarray(normals), axis=-1, keepdims=True) / length, 0.0)
+            cosine = np.maximum(np.einsum("...i,...i->...", scaled, np.asarray(normals))[..., None] / length, 0.0)
             irradiance = self.intensity_along(-scaled / length) * cosine / (reach * length) / (reach * length)
         return np.asarray(np.minimum(irradiance, MAX_RADIANCE))
 
