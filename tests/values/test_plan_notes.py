@@ -28,6 +28,7 @@ from translucent.planning.passes import Note, NoteKind, PassName
 from translucent.planning.plan import plan
 from translucent.planning.render_plan import Capabilities, RenderPlan
 
+METAL, LAMP = tl.Surface(metallic=1.0), tl.Surface(emissive=(1, 1, 1))
 LIT = [tl.PointLight((0, 0, 5), (1, 1, 1))]
 TRACED = Capabilities(shader_storage=False, opengl=False)
 
@@ -77,6 +78,14 @@ def test_every_pass_has_a_name_and_every_note_a_kind(kind: str) -> None:
         (scene(body(DIAMOND)), tl.ThinLayer(), Capabilities(), NoteKind.LATER_REFRACTION),
         (scene(body(), body(None)), None, Capabilities(), NoteKind.SHADOWS),
         (scene(body(tl.Medium())), None, Capabilities(), NoteKind.INVISIBLE),
+        (scene(body(DIAMOND), body(None, OPEN)), None, Capabilities(), NoteKind.REFLECTED_LIGHT),
+        (scene(body(DIAMOND), body(None, surface=METAL)), None, Capabilities(), NoteKind.REFLECTED_LIGHT),
+        (
+            scene(body(DIAMOND), body(None, x=9), body(None, x=5, surface=LAMP)),
+            None,
+            Capabilities(),
+            NoteKind.REFLECTED_LIGHT,
+        ),
         (scene(body(MILK), lights=[tl.SphereLight((0, 0, 5), 1.0, 0.5)]), None, Capabilities(), NoteKind.SPHERE_LIGHTS),
         (scene(body(), body(x=3, priority=1)), None, Capabilities(), NoteKind.UNUSED_PRIORITIES),
     ],
@@ -86,8 +95,9 @@ def test_a_plan_says_what_kind_of_thing_it_leaves_out(
     asked: tl.Scene, method: Any, machine: Capabilities, kind: NoteKind
 ) -> None:
     assert plan(asked, method, machine).says(kind)
-    clean = plan(scene(sheet()), None, Capabilities())
-    assert not clean.says(kind)
+    cavity = scene(body(DIAMOND), body(tl.Medium(), priority=1), body(None), overlap="priority")
+    for clean in (scene(sheet()), *([cavity] if kind in (NoteKind.INVISIBLE, NoteKind.REFLECTED_LIGHT) else [])):
+        assert not plan(clean, None, Capabilities()).says(kind)
 
 
 def test_each_way_of_finding_interfaces_tells_what_it_leaves_out() -> None:

@@ -37,8 +37,9 @@ LARGEST_EXCHANGING = 2.0
 
 def may_hold(body: Object, item: Object) -> bool:
     """Whether an opaque object may be inside a body, so that it is lit by the light there."""
-    meet = (item.bounds[0] < body.bounds[1]).all() and (item.bounds[1] > body.bounds[0]).all()
-    return bool(meet) and item.mesh.diagnosis.solid
+    if not item.mesh.diagnosis.solid:  # An open one, such as a ground, must be inside its bounds.
+        return bool((item.bounds[0] >= body.bounds[0]).all() and (item.bounds[1] <= body.bounds[1]).all())
+    return bool((item.bounds[0] < body.bounds[1]).all() and (item.bounds[1] > body.bounds[0]).all())
 
 
 def held_objects(scene: Scene) -> tuple[int, ...]:

@@ -186,7 +186,7 @@ def unmodelled_effects(scene: Scene, *, scattering: bool, interfaces: InterfaceM
     surfaces = interfaces is not None
     effects = _scattering_effects(scene, followed=scattering, interfaces=surfaces)
     effects += _refraction_effects(scene, interfaces)
-    if clear := [body for body in scene.bodies if _is_invisible(body)]:
+    if clear := [body for body in scene.bodies if _is_invisible(body) and not _is_cavity(body, scene)]:
         text = f"{object_names(clear)}: invisible, because the medium does not absorb, scatter or emit light"
         effects.append(Note(NoteKind.INVISIBLE, text))
     if not surfaces and (surfaced := [item for item in scene.opaque if item.surface is not None]):
@@ -246,22 +246,32 @@ def shadow_effects(scene: Scene) -> list[Note]:
 
 
 def reflected_effects(scene: Scene, exchanging: Sequence[int]) -> list[Note]:
-    """Notes on light that opaque objects in clear bodies do not get; `exchanging` are those with light of all kinds."""
-    held = held_objects(scene)
+    """Notes on light that opaque objects do not get; `exchanging` are those with light of all kinds."""
+    items, held, texts = scene.objects, held_objects(scene), []
+    left_out = [i for i in held if i not in exchanging or _is_metal(items[i])]
     if held and exchanging and scene.lights:
-        text = (
-            f"{object_names([scene.objects[i] for i in held])}: light of the lights on these objects is up to 40 % "
+        texts.append(
+            f"{object_names([items[i] for i in held])}: light of the lights on these objects is up to 40 % "
             "wrong without caustics, because it comes straight, and up to 20 % with caustics"
         )
-        return [Note(NoteKind.REFLECTED_LIGHT, text)]
-    if left_out := [i for i in held if i not in exchanging]:
-        text = (
-            f"{object_names([scene.objects[i] for i in left_out])}: up to 20 % wrong, without light that interfaces "
+    elif left_out:
+        texts.append(
+            f"{object_names([items[i] for i in left_out])}: up to 30 % wrong, without light that interfaces "
             "refract onto these objects, and light that opaque objects reflect onto each other; --method path-traced "
             "includes this light"
         )
-        return [Note(NoteKind.REFLECTED_LIGHT, text)]
-    return []
+    lamps = [item for item in scene.opaque if item.surface is not None and item.surface.glows]
+    unlit = [item for i, item in enumerate(items) if item.medium is None and i not in exchanging and item not in lamps]
+    if lamps and unlit:
+        texts.append(
+            f"{object_names(lamps)}: the light that these surfaces emit does not reach {object_names(unlit)}; "
+            "--method path-traced includes this light"
+        )
+    return [Note(NoteKind.REFLECTED_LIGHT, text) for text in texts]
+
+
+def _is_metal(item: Object) -> bool:
+    return item.surface is not None and item.surface.metallic > 0.0
 
 
 def _scattering_effects(scene: Scene, *, followed: bool, interfaces: bool) -> list[Note]:
@@ -321,7 +331,9 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
         if scene.lights:
             text += "; where lights shine from behind, bodies are up to 20 % too dark, and rims up to 40 % too bright"
         if rest := [body for body in scene.bodies if body not in bodies]:
-            text += f"; up to 10 % too dark next to {object_names(rest)}, whose light does not reach these bodies"
+            inside = any(may_hold(other, body) for other in rest for body in bodies)
+            where = "up to 30 % too dark in, and up to 10 % next to" if inside else "up to 10 % too dark next to"
+            text += f"; {where} {object_names(rest)}, whose light does not reach these bodies"
         ahead = [body.medium is not None and body.medium.anisotropy >= STRONGLY_AHEAD for body in bodies]
         if any(ahead) and scene.environment.kind == "image":
             text += "; bright parts of the environment, scattered forward by the bodies, are up to 10 % wrong"
@@ -344,6 +356,11 @@ def _refraction_effects(scene: Scene, interfaces: InterfaceMode | None) -> list[
     if interfaces is None:
         return [STRAIGHT]
     return interfaces.unmodelled()
+
+
+def _is_cavity(body: Object, scene: Scene) -> bool:
+    """Whether a body may displace one with an interface, and so be seen by that."""
+    return scene.overlap == "priority" and any(other.has_interface and may_hold(other, body) for other in scene.bodies)
 
 
 def _is_invisible(body: Object) -> bool:
