@@ -16,6 +16,9 @@ import pytest
 import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
 from translucent import assets as data
+from translucent.diffusion import irradiance_maps
+from translucent.geometry.solids import Sphere
+from translucent.planning.plan import plan as plan_of
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.rendered import Treatment
 from translucent.preview import quality, viewport_renderer
@@ -27,12 +30,20 @@ from translucent.preview.tasks import Task
 from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
 
+GLASS = tl.Medium(ior=1.5)
+
 
 @pytest.fixture
 def view(quick_pictures: None) -> Iterator[ViewportRenderer]:
     made = ViewportRenderer()
     yield made
     made.close()
+
+
+@pytest.fixture
+def solved_here(work: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Light is solved for in the thread that else waits for a worker process, which takes a second to start."""
+    monkeypatch.setattr(work.pool, "call", lambda task, solve, *given, urgency: solve(*given))
 
 
 @pytest.mark.parametrize("budget", [1e9, 0.0])
@@ -140,6 +151,33 @@ def test_light_diffuses_as_soon_as_it_is_solved_for(view: ViewportRenderer, work
     assert not view.plans[0].diffuses
 
 
+@pytest.mark.usefixtures("solved_here")
+def test_light_on_objects_in_glass_is_solved_for_aside(
+    view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Until then, and while a light moves, it comes straight."""
+    monkeypatch.setattr(irradiance_maps, "SAMPLES", 64)
+    glass, inner = (tl.Object(Sphere(radius=r).tessellate(8), medium) for r, medium in ((1.0, GLASS), (0.5, None)))
+    camera, suns = tl.Camera.look_at((0, 2, 5), (0, 0, 0)), [tl.DirectionalLight((x, -1, -1), 2.0) for x in (0.0, 1.0)]
+    scenes = [tl.Scene([glass, inner], camera, [sun], tl.Environment.constant("#808080")) for sun in suns]
+    monkeypatch.setattr(work, "scene", lambda: scenes[0])
+    diffusion, told = view.renderer.gpu.diffusion, "Light on objects in glass: first guess"
+    assert view.draw(work, SIZE)
+    assert (view.quality.notes[1], diffusion.of(plan_of(scenes[0]))) == (told, None)
+    finish(view, work)
+    assert view.quality.notes[1] == ""
+    light = diffusion.of(plan_of(scenes[0]))
+    assert light is not None
+    assert set(light.fields.maps) == {1}
+    with view.current():
+        frame = view.renderer.render(scenes[0], SIZE)
+    assert np.abs(pixels(view) - frame.to_srgb8().astype(int)).max() <= 1
+    scenes.reverse()
+    view.draw(work, SIZE)
+    assert (view.quality.notes[1], work.lanes["diffuse"].task) == (told, None)
+
+
+@pytest.mark.usefixtures("solved_here")
 def test_light_that_takes_long_to_solve_for_is_drawn_in_the_next_frame(
     view: ViewportRenderer, work: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -50,7 +50,7 @@ from translucent.scene.scene import Object, Scene
 from translucent.threads import one_blas_thread
 
 #: Bodies, and lit scenes, that are kept.
-KEPT_BODIES, KEPT_SCENES = 16, 4
+KEPT_BODIES, KEPT_SCENES = 16, 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +121,11 @@ class FieldCache:
         scene, diffusion, key = plan.scene, plan.diffusion, diffusion_key(plan)
         if (known := self._scenes.get(key)) is not None:
             return known  # nobody waits for other light that a thread looks for
+        without = self.of(replace(plan, exchanging=())) if plan.exchanging else None
 
         def make() -> Fields:
+            if without is not None:
+                return replace(without, maps=irradiance_maps(scene, plan.exchanging, photons_on_opaque(plan)))
             places = tuple(opaque_key(item) for item in scene.opaque)
             opaque = kept(self._opaque, places, lambda: opaque_surfaces(scene.opaque), 1)
             media, bent = diffusing_media(scene), self._bent(plan)
@@ -142,16 +145,18 @@ class FieldCache:
                 if i not in bodies
             }
             ground = ground_map(scene, {i: own.lit for i, own in bodies.items()}, surfaces)
-            maps = irradiance_maps(scene, plan.exchanging, photons_on_opaque(plan)) if plan.exchanging else {}
-            return Fields(surfaces, volumes, ground, maps)
+            return Fields(surfaces, volumes, ground)
 
         with self._lock, one_blas_thread():
             return kept(self._scenes, key, make, KEPT_SCENES)
 
     def keep(self, plan: RenderPlan, fields: Fields) -> None:
-        """Store the light of a plan, found by another solver."""
+        """Store the light of a plan, found by another solver, and that without maps, for quicker pictures."""
         with self._lock:
             kept(self._scenes, diffusion_key(plan), lambda: fields, KEPT_SCENES)
+            if plan.exchanging:
+                without = replace(fields, maps={})
+                kept(self._scenes, diffusion_key(replace(plan, exchanging=())), lambda: without, KEPT_SCENES)
 
     def has(self, key: Hashable) -> bool:
         """True if the light of this `diffusion_key` is known."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import weakref
 from collections import OrderedDict
 from collections.abc import Hashable, Sequence
+from dataclasses import replace
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arrays import Array
+from translucent.diffusion.keys import diffusion_key
 from translucent.errors import RenderError
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.gpu.constants import CONSTANTS
@@ -174,11 +176,11 @@ class DiffusionCache:
     def of(self, plan: RenderPlan) -> DiffusedTexture | None:
         """Diffused light of the bodies of a plan, None where there is none.
 
-        A window does not wait for the light on opaque objects in clear bodies.
+        In a window, maps of irradiance are left out until they have been stored.
         """
-        if not (plan.diffuses if self.warm_starts else plan.solves) or not (
-            fields := self._solver(plan.diffusion).of(plan)
-        ):
+        if self.warm_starts and plan.exchanging and not self.has(diffusion_key(plan)):
+            plan = replace(plan, exchanging=())
+        if not plan.solves or not (fields := self._solver(plan.diffusion).of(plan)):
             return None
         if self._last is None or self._last.fields is not fields:
             self._release_last()

@@ -262,14 +262,17 @@ class InteractiveQuality:
     ) -> Scattering | None:
         """Scattering as requested if its light is known, else a simpler one while a worker process solves for it.
 
-        That begins when the same light is needed twice: while things move, that of every picture is another.
+        That begins when the same light is needed twice: while things move, that of every picture is another. Light on
+        opaque objects in clear bodies is solved for, too; until then, it comes straight.
         """
-        if not plan.diffuses:
+        if not plan.solves:
             return plan.request.scattering
         at_surfaces = bool(plan.treated(Treatment.DIFFUSION))
         instead: Scattering = ScatteringLayer() if at_surfaces else SingleScattering()
         where = f"Softening light in the {workspace.document.material.preset.replace('_', ' ') or 'model'}"
         roughly = "first guess" if at_surfaces else "only light that is scattered once"
+        if not plan.diffuses:
+            where, roughly = "Light on objects in glass", "first guess"
         key, lane = diffusion_key(plan), workspace.lanes["diffuse"]
         moves, self._last = key != self._last, key
         if cache.has(key):
@@ -288,7 +291,7 @@ class InteractiveQuality:
             solve_aside(task, workspace.pool, cache, plan)
 
         if not moves:
-            lane.request(key, "softening light", solve)
+            lane.request(key, "softening light" if plan.diffuses else "light in glass", solve)
         if small is not None and self._knows(small, bodies, cache):
             roughly, instead = "rough preview", SMALL
         self.notes[1] = f"{where}: {roughly}"
@@ -310,13 +313,13 @@ class InteractiveQuality:
 
 def _on_small_grid(scene: Scene, plan: RenderPlan) -> RenderPlan | None:
     """The plan on the small grid; None where that does not take all of its bodies, or is no smaller."""
-    if plan.diffusion.resolution <= SMALL.resolution:
+    if not plan.diffuses or plan.diffusion.resolution <= SMALL.resolution:
         return None
     if any(SMALL.refusal(scene.objects[i]) is not None for i in plan.treated(Treatment.DIFFUSION, Treatment.VOLUME)):
         return None
     treatments = ((i, treatment_of(item)) for i, item in enumerate(plan.scene.objects))
     own = {i: treatment for i, treatment in treatments if treatment is not Treatment.SINGLE}
-    return replace(plan, diffusion=SMALL) if choose_treatments(scene, SMALL).of == own else None
+    return replace(plan, diffusion=SMALL, exchanging=()) if choose_treatments(scene, SMALL).of == own else None
 
 
 def _bodies(plan: RenderPlan) -> Hashable:
@@ -558,7 +561,7 @@ class PhotonRefinement:
         """True if the light of photons in media is known, if there is any; else it is solved for."""
         assert self.plan is not None
         plan, caustics, cache = self.plan, self.plan.caustics, renderer.gpu.diffusion
-        if not media_lit_by_photons(plan.scene):
+        if not media_lit_by_photons(plan.scene) and not plan.exchanging:
             return True
         assert caustics is not None
         key, lane = diffusion_key(plan), workspace.lanes["diffuse"]
