@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import dataclasses
 import json
@@ -597,6 +596,8 @@ def _executor(address: str | None) -> Iterator[Executor | None]:
         yield None
         return
     distributed = require_package("distributed", f"--dask {address}", "omit --dask to bake on this machine")
+    import asyncio  # 45 ms of each start of the command line, and only this needs it
+
     try:
         # A client that cannot connect leaves its loop running, with nothing to close it by.
         asyncio.run(_knock(distributed, address))
