@@ -49,7 +49,7 @@ def points(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("points")
 def test_rounds_add_up_to_the_photons_of_one_frame(view: ViewportRenderer) -> None:
-    """They are the same photons, so that energy is right whatever their number; and the picture is drawn in parts."""
+    """Energy is right in few or many; all in one step are the same photons, and the picture is drawn in parts."""
     plan = view.renderer.plan(LIT, caustics=tl.Caustics(ROUND))
     with view.current():
         viewport = Viewport(view.renderer.gpu)
@@ -64,8 +64,13 @@ def test_rounds_add_up_to_the_photons_of_one_frame(view: ViewportRenderer) -> No
             errors.append(light.error)
             lights.append(light._before[1])
         assert light.photons == 16 * ROUND
+        whole = PhotonPicture(view.renderer.gpu, plan, viewport.size)
+        whole._at_once = 16
+        whole.step(0.0)
+        whole.show()
+        lights.append(whole._before[1])
         for _ in range(4):
-            viewport.step(0, plan, 2, photons=light.texture)
+            viewport.step(0, plan, 2, photons=whole.texture)
         side = viewport._side(0, SIZE)
         kept = np.frombuffer(side.light.read(components=4, dtype="f4"), np.float32).reshape(SIZE[1], SIZE[0], 4)
         place = [side.kept(x, y) for y in range(SIZE[1]) for x in range(SIZE[0])]
@@ -73,6 +78,7 @@ def test_rounds_add_up_to_the_photons_of_one_frame(view: ViewportRenderer) -> No
         assert viewport.mean_radiance() == pytest.approx(shown.mean(), rel=1e-5)
         frame = view.renderer.render(LIT, SIZE, caustics=tl.Caustics(16 * ROUND))
         light.release()
+        whole.release()
         viewport.release()
     # What is seen through glass is looked up in each part of the picture; silhouettes may fall to either side.
     off = np.abs(shown - frame.radiance) > 1e-5 + 1e-4 * frame.radiance
@@ -110,7 +116,8 @@ def test_photons_light_the_still_picture_until_something_changes(
     count = view.photons.light.photons  # type: ignore[union-attr]
     with view.current():
         frame = view.renderer.render(LIT, SIZE, caustics=tl.Caustics(count))
-    assert (np.abs(pixels(view) - frame.to_srgb8().astype(int))[~frame.coverage] > 1).mean() < 1e-3
+    # Photons are as evenly divided between reflection and refraction in each step: the noise is another one.
+    assert np.abs(pixels(view) - frame.to_srgb8().astype(int))[~frame.coverage].mean() < 0.5
     assert np.abs(pixels(view) - without).mean() > 0.5
     work.do(SetField("display.caustics", False))
     finish(view, work)
