@@ -124,6 +124,8 @@ def _with_panels(radiance: Array, towards: Array, panels: tuple[Panel, ...]) -> 
 
 def _room(height: Array) -> Array:
     """Floor, wall and ceiling by the sine of the elevation; where floor and wall meet the corner is rounded."""
+    if height.ndim > 1 and height.shape[-1] > 1 and (height == height[..., :1]).all():  # rows of a map are alike
+        return np.repeat(_room(height[..., :1]), height.shape[-1], axis=-2)
     above = np.clip(height, 0.0, 1.0)[..., None]
     below = np.clip(-height, 0.0, 1.0)[..., None]
     wall = _mixed(np.asarray(WALL), np.asarray(CEILING), _smooth(above / 0.9))
