@@ -89,6 +89,8 @@ class CellSystem:
     def __init__(self, grid: BodyGrid, d: Array, absorbed: Array, lost: Array) -> None:
         pattern, values = grid.pattern, _balance(grid, d, absorbed, lost)
         self._matrix = sparse.csr_array((values, pattern.columns, pattern.starts), (grid.count, grid.count))
+        # SciPy makes columns of vectors before it multiplies a matrix by them.
+        self._operator = LinearOperator(self._matrix.shape, self._matrix.__matmul__, dtype=np.float64)
         self._approximate_inverse = _approximate_inverse(grid, self._matrix)
         self._known = KnownSolutions(self._matrix)
         self._taken = float(absorbed.sum() + lost.sum())
@@ -122,7 +124,7 @@ class CellSystem:
     def _found(self, right_side: Array, near: Array, tolerance: float) -> tuple[Array, int]:
         steps = count()
         found, failed = cg(
-            self._matrix,
+            self._operator,
             right_side,
             near,
             rtol=tolerance,

@@ -152,6 +152,7 @@ class LitBody:
     others: tuple[LitBody, ...] = ()
     arriving: OrderedDict[Hashable, tuple[Array, EnteringRays]] = field(default_factory=OrderedDict)
     _entrances: dict[tuple[float, float], Entrance] = field(default_factory=dict)
+    _exchanges: dict[tuple[float, float], Exchange] = field(default_factory=dict)
     _sky_paths: dict[tuple[Mesh, bytes], sparse.csr_array] = field(default_factory=dict)
 
     @property
@@ -262,7 +263,13 @@ class LitBody:
         return cKDTree(self.grid.points)
 
     def exchange(self, ior: float, roughness: float) -> Exchange:
-        """Flux that enters the body for flux that leaves it, through an interface with this index and roughness."""
+        """Flux that enters the body for flux that leaves it, by index and roughness; the last one is cached."""
+        if (ior, roughness) not in self._exchanges:
+            self._exchanges.clear()
+            self._exchanges[ior, roughness] = self._exchange(ior, roughness)
+        return self._exchanges[ior, roughness]
+
+    def _exchange(self, ior: float, roughness: float) -> Exchange:
         entrance, patches, sky, samples = (
             self.entrance(ior, roughness),
             self.patches,

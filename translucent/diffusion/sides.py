@@ -96,8 +96,9 @@ class SurfaceSides:
         near = np.maximum(self.weights @ values, 0.0)
         ends, found = np.cumsum([own.shape[1] for own, _ in parts]), []
         for own, (_, deep) in zip(np.split(near, ends[:-1], axis=1), parts, strict=True):
-            volume = np.zeros((SIDES, int(np.prod(self.shape)), own.shape[1]), np.float32)
-            volume[:, self.deep] = deep[self.numbers] if isinstance(deep, np.ndarray) else deep
+            inside = np.zeros((int(np.prod(self.shape)), own.shape[1]), np.float32)
+            inside[self.deep] = deep[self.numbers] if isinstance(deep, np.ndarray) else deep
+            volume = np.repeat(inside[None], SIDES, axis=0)
             volume.reshape(-1, own.shape[1])[self.places] = own
             found.append(volume.reshape(SIDES, *self.shape, -1))
         return found
