@@ -149,10 +149,15 @@ def _approximate_inverse(grid: BodyGrid, matrix: sparse.csr_array) -> LinearOper
     """
     of, blocks = grid.blocks, int(grid.blocks.max(initial=-1)) + 1
     coarse = np.linalg.inv(np.bincount(grid.block_pairs, matrix.data, blocks * blocks).reshape(blocks, blocks))
-    diagonal = 1.0 / matrix.data[grid.pattern.diagonal]
+    diagonal, tiny = 1.0 / matrix.data[grid.pattern.diagonal], np.finfo(np.float64).tiny
+    # In single precision, which has no room for the powers of all sizes of bodies: in units of the largest number.
+    unit = np.abs(coarse).max(initial=tiny)
+    coarse = (coarse / unit).astype(np.float32)
 
     def apply(right_side: Array) -> Array:
-        return np.asarray(diagonal * right_side + (coarse @ np.bincount(of, right_side, blocks))[of])
+        sums = np.bincount(of, right_side, blocks)
+        size = np.abs(sums).max(initial=tiny)
+        return np.asarray(diagonal * right_side + ((unit * size) * (coarse @ (sums / size).astype(np.float32)))[of])
 
     return LinearOperator(matrix.shape, apply, dtype=np.float64)
 
