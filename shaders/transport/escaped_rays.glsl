@@ -88,8 +88,8 @@ bool environment_in_footprint(EscapedRay end, out vec3 light) {
 vec3 radiance_of_opaque(EscapedRay end) {
     vec3 light;
     bool has_textures = picture_first == 0 && reads_all_textures(end.object);
-    bool has_light = traced_body(end.object).diffuses > 0.5;  // photons in the picture would blur its textures
-    bool is_known = end.triangle >= 0 && end.blur == 0.0 && (has_textures || has_light);
+    bool has_light = traced_body(end.object).diffuses > 0.5;  // photons in the picture would count twice
+    bool is_known = has_light || (has_textures && end.triangle >= 0 && end.blur == 0.0);
     // A loop in place of a branch: software rasterizers leave it where no ray of a group is hidden.
     for (bool hidden = is_known || !opaque_in_picture(end, light); hidden; hidden = false) {
         ObjectRow body = traced_body(end.object);

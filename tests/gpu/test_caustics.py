@@ -451,3 +451,15 @@ def test_fog_has_what_hardly_bends_once(renderer: tl.Renderer, monkeypatch: pyte
     print(np.sqrt(np.square(error).mean()) / truth.mean(), error.mean() / truth.mean())
     assert np.sqrt(np.square(error).mean()) < 0.02 * truth.mean()
     assert abs(error.mean()) < 5e-3 * truth.mean()  # half of that is what facets cut off the ball
+
+
+def test_light_on_a_ball_in_glass_counts_once(renderer: tl.Renderer) -> None:
+    """In a body that hardly refracts, photons bring as much light to an opaque ball as comes straight."""
+    eye = tl.Camera.look_at((0, 3, 6), (0, 0, 0), fov_y=8.0)
+    ball = [tl.Object(BALL, tl.Medium(ior=1.0001)), tl.Object(CORE, color=(0.7, 0.7, 0.7))]
+    one = tl.Scene(ball, eye, [tl.DirectionalLight((0, -0.6, -0.8), 1.0)], NIGHT)
+    straight, by_photons = (
+        renderer.render(one, (8, 8), samples=1, caustics=given).radiance.mean()
+        for given in (None, tl.Caustics(1 << 17))
+    )
+    assert by_photons == pytest.approx(straight, rel=0.03)
