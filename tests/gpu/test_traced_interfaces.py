@@ -88,7 +88,7 @@ def second_renderer() -> Iterator[tl.Renderer]:
 @pytest.fixture
 def thorough(second_renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> tl.Renderer:
     """Renderer that follows fainter rays than pictures need: its tree is that of the reference."""
-    monkeypatch.setattr(traced_interfaces, "faintest_throughput", lambda forks, samples: 1e-4)
+    monkeypatch.setattr(traced_interfaces, "faintest_throughput", lambda forks: 1e-4)
     return second_renderer
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.errors import InputError
 from translucent.media.medium import Medium
 from translucent.planning.passes import Note, NoteKind
@@ -37,17 +38,24 @@ LARGEST_EXCHANGING = 2.0
 
 def may_hold(body: Object, item: Object) -> bool:
     """Whether an opaque object may be inside a body, so that it is lit by the light there."""
-    if not item.mesh.diagnosis.solid:  # An open one, such as a ground, must be inside its bounds.
-        return bool((item.bounds[0] >= body.bounds[0]).all() and (item.bounds[1] <= body.bounds[1]).all())
-    return bool((item.bounds[0] < body.bounds[1]).all() and (item.bounds[1] > body.bounds[0]).all())
+    return _may_be_inside(item, *body.bounds)
 
 
 def held_objects(scene: Scene) -> tuple[int, ...]:
     """Numbers of the opaque objects that may be inside clear bodies."""
-    clear = _clear_bodies(scene)
-    return tuple(
-        i for i, item in enumerate(scene.objects) if item.medium is None and any(may_hold(body, item) for body in clear)
-    )
+    bounds = np.reshape([body.bounds for body in _clear_bodies(scene)], (-1, 2, 3))
+    low, high = bounds[:, 0], bounds[:, 1]
+    return tuple(i for i, item in enumerate(scene.objects) if item.medium is None and _may_be_inside(item, low, high))
+
+
+def _may_be_inside(item: Object, low: Array, high: Array) -> bool:
+    """Whether an object may be inside any of boxes with corners (..., 3)."""
+    first, last = item.bounds
+    if item.mesh.diagnosis.solid:
+        inside = (first < high) & (last > low)
+    else:  # An open one, such as a ground, must be inside the box.
+        inside = (first >= low) & (last <= high)
+    return bool(inside.all(axis=-1).any())
 
 
 def exchanging_objects(scene: Scene) -> tuple[int, ...]:

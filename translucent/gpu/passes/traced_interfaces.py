@@ -54,9 +54,8 @@ _ENTERED = ("entered", "surface_parameters", "surface_color")
 #: Samplers of ``shaders/transport/hierarchy.glsl``, and of the table of objects.
 RAY_SAMPLERS = ("object_table", "hierarchy_nodes", "hierarchy_triangles")
 
-#: Throughput of a ray, its three channels together, below which it is not followed in a picture of one sample, with two
-#: forks or fewer: less than 1.7 % of the light of each channel, one step of a picture with 8 bits.
-FAINTEST_THROUGHPUT = 3 * 0.017
+#: Throughput of a ray, its three channels together, below which it is not followed, with two forks or fewer.
+FAINTEST_THROUGHPUT = 1.2e-2
 
 #: Room around the mirror images of bodies that rough coats blur, in heights of the picture.
 MIRROR_ROOM = 0.06
@@ -114,7 +113,7 @@ class TracedInterfacesPass:
         values = {
             "mirrored": 0,
             "adaptive": int(job.bending),
-            "faintest_throughput": faintest_throughput(forks, job.samples),
+            "faintest_throughput": faintest_throughput(forks),
             "most_interfaces": depth,
             "microfacet_points": microfacet_points(job.sample),
             "blurred_fraction": 0.0 if job.plan.request.denoise else blurred_fraction(job.samples),
@@ -298,13 +297,12 @@ def _ground_shadows(job: FrameJob, switches: Mapping[str, bool | int]) -> dict[s
     return {"ground_rows": ground.rows, "mapped_ground": ground.plane}
 
 
-def faintest_throughput(forks: int, samples: int) -> float:
+def faintest_throughput(forks: int) -> float:
     """Throughput of a ray, its three channels together, below which it is not followed.
 
-    More forks ask for fainter rays: a fourth of that for each beyond the second. What is left out does not average out
-    over samples, so that it falls with them as their noise does.
+    With two forks the rays left out weigh as much as those of a third fork; more forks ask for more.
     """
-    return FAINTEST_THROUGHPUT * float(samples**-0.5) / 4.0 ** max(forks - 2, 0)
+    return FAINTEST_THROUGHPUT / 4.0 ** max(forks - 2, 0)
 
 
 def blurred_fraction(samples: int) -> float:
