@@ -51,10 +51,9 @@ def held_objects(scene: Scene) -> tuple[int, ...]:
 def _may_be_inside(item: Object, low: Array, high: Array) -> bool:
     """Whether an object may be inside any of boxes with corners (..., 3)."""
     first, last = item.bounds
-    if item.mesh.diagnosis.solid:
-        inside = (first < high) & (last > low)
-    else:  # An open one, such as a ground, must be inside the box.
-        inside = (first >= low) & (last <= high)
+    # A solid may be inside in part; an open one, such as a ground, must be inside the box.
+    solid = item.mesh.diagnosis.solid
+    inside = (first < high) & (last > low) if solid else (first >= low) & (last <= high)
     return bool(inside.all(axis=-1).any())
 
 
