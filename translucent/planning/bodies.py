@@ -37,7 +37,7 @@ LARGEST_EXCHANGING = 2.0
 
 
 def may_hold(body: Object, item: Object) -> bool:
-    """Whether an opaque object may be inside a body, so that it is lit by the light there."""
+    """Test whether an opaque object may be inside a body, and so receive the light in it."""
     return _may_be_inside(item, *body.bounds)
 
 
@@ -49,7 +49,7 @@ def held_objects(scene: Scene) -> tuple[int, ...]:
 
 
 def _may_be_inside(item: Object, low: Array, high: Array) -> bool:
-    """Whether an object may be inside any of boxes with corners (..., 3)."""
+    """Test whether an object may be inside at least one box; `low` and `high` (..., 3) are the corners of the boxes."""
     first, last = item.bounds
     # A solid may be inside in part; an open one, such as a ground, must be inside the box.
     solid = item.mesh.diagnosis.solid

@@ -359,7 +359,7 @@ def _refraction_effects(scene: Scene, interfaces: InterfaceMode | None) -> list[
 
 
 def _is_cavity(body: Object, scene: Scene) -> bool:
-    """Whether a body may displace one with an interface, and so be seen by that."""
+    """Test whether a body may displace a body with an interface: then the interface between them is visible."""
     return scene.overlap == "priority" and any(other.has_interface and may_hold(other, body) for other in scene.bodies)
 
 
