@@ -15,7 +15,7 @@ layout(location = 0) out vec2 path_and_count;  // or the paths in two media: of 
 
 void main() {
     float side = gl_FrontFacing ? -1.0 : 1.0;
-    float reached = max(axial, axial_start);
+    float reached = axial;  // maps look at all of the scene from outside
 #if PROJECTED_DEPTH
     path_and_count = side * vec2(reached * axial_depth_scale + axial_depth_start, 1.0);
 #else

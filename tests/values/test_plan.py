@@ -7,8 +7,10 @@ import json
 import subprocess
 import sys
 import weakref
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 import translucent as tl
@@ -30,9 +32,11 @@ from tests.values.plan_scenes import (
 )
 from translucent.planning.assembly import COSTS
 from translucent.planning.methods import METHODS
-from translucent.planning.plan import plan
+from translucent.planning.plan import plan, plan_scene
 from translucent.planning.render_plan import Capabilities
 from translucent.planning.rendered import occluder_scene, occluders
+from translucent.planning.request import RenderRequest
+from translucent.scene.camera import Window
 
 ONCE = tl.SingleScattering()
 
@@ -399,6 +403,19 @@ def test_shadows_of_many_open_surfaces_are_sums_in_narrower_maps() -> None:
     asked = plan(scene(body(mesh=mesh), body(None, x=3), lights=[sun]), shadows=tl.ShadowMaps(512))
     assert asked.shadows.size == 512
     assert note not in asked.unmodelled
+
+
+def test_shadow_maps_are_as_fine_as_the_picture_can_show() -> None:
+    """Two texels a pixel: here the picture is twice as high as what throws shadows, whatever the ground."""
+    floor = tl.Mesh([(-99, -9, -99), (99, -9, -99), (99, -9, 99), (-99, -9, 99)], [(0, 2, 1), (0, 3, 2)])
+    low, high = body().bounds
+    camera = tl.Camera.orthographic((0, 0, 9), (0, 0, 0), height=2.0 * float(np.linalg.norm(high - low)))
+    objects, sun = [body(), tl.Object(floor, shadow_catcher=True)], tl.DirectionalLight((0, -1, 0), 1.0)
+    seen = replace(scene(*objects, lights=[sun]), camera=camera)
+    sizes = [plan_scene(seen, RenderRequest(pixels=side * side)).shadows.size for side in (0, 64, 400, 800)]
+    assert sizes == [1024, 256, 512, 1024]
+    part = replace(seen, camera=replace(camera, window=Window(0, 0, (800, 800))))
+    assert plan_scene(part, RenderRequest(pixels=64 * 64)).shadows.size == 1024
 
 
 def test_shadows_on_a_backdrop_are_as_requested() -> None:

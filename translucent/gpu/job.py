@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,6 +11,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Array
 from translucent.gpu.diffusion import DiffusedTexture, density_uniforms, ground_uniforms, scene_grids
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.layout import (
@@ -55,11 +56,13 @@ from translucent.gpu.uniforms import (
     scatter_uniforms,
     shade_uniforms,
     surface_uniforms,
+    turned_records,
     view_uniforms,
 )
 from translucent.planning.passes import PassSpec
 from translucent.planning.render_plan import RenderPlan
 from translucent.scene.backdrop import Backdrop
+from translucent.scene.camera import Camera
 from translucent.scene.grounds import Mirror, mirror_of
 
 
@@ -126,6 +129,7 @@ class UniformBuffers:
         self._records = self._content[:, : BODY.dtype.itemsize].view(BODY.dtype)[:, 0]
         self._records[:] = records
         self.bodies = gl.buffer(reserve=self._content.nbytes)
+        self._first = 0
         self._constant = {block: gl.buffer(content) for block, content in contents.items()}
 
     def place(self, view: SampleView) -> None:
@@ -134,6 +138,18 @@ class UniformBuffers:
         self.bodies.write(self._content)
         self._view.write(view_uniforms(view, self._placed))
         self.bind()
+
+    def place_before(self, cameras: Sequence[Camera], center: Array) -> None:
+        """Write the uniforms of bodies before each of these cameras, by `turned_records`; `choose` chooses one."""
+        content = np.zeros((len(cameras), *self._content.shape), np.uint8)
+        records = content[..., : BODY.dtype.itemsize].view(BODY.dtype)[..., 0]
+        records[:] = turned_records(self._records, self._placed, cameras, center)
+        self.bodies.orphan(content.nbytes)
+        self.bodies.write(content)
+
+    def choose(self, camera: int) -> None:
+        """Choose one of the cameras of `place_before`, by its number."""
+        self._first = camera * len(self._records)
 
     def add(self, block: UniformBlock, content: bytes) -> None:
         """Add a block that is the same for all samples; `bind` binds it."""
@@ -149,7 +165,8 @@ class UniformBuffers:
 
     def bind_body(self, number: int) -> None:
         """Bind the uniforms of one object for the next draw."""
-        self.bodies.bind_to_uniform_block(BODY.binding, offset=number * BODY_STRIDE, size=BODY.dtype.itemsize)
+        offset = (self._first + number) * BODY_STRIDE
+        self.bodies.bind_to_uniform_block(BODY.binding, offset=offset, size=BODY.dtype.itemsize)
 
     def release(self) -> None:
         """Free the buffers."""

@@ -286,7 +286,7 @@ class ShadowAtlas:
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
         self._framebuffers: tuple[moderngl.Framebuffer, ...] = ()
-        self._made_of: tuple[tuple[int, int], int] | None = None
+        self._made_of: tuple[tuple[int, int], int, bool] | None = None
         self.held: ShadowMapKey | None = None
         self.drawn: set[ShadowView] = set()
         self.views: ShadowViews | None = None
@@ -303,16 +303,17 @@ class ShadowAtlas:
         """
         self.held = None
         self.drawn.clear()
-        components = 4 if spectral else 2 if two_media or any(view.ends for view in views) else 1
-        if self._made_of != (views.extent, components):
+        ends = any(view.ends for view in views)
+        components = 4 if spectral else 2 if two_media or ends else 1
+        if self._made_of != (views.extent, components, ends):
             self.release()
-            self._framebuffers = self._made(views.extent, components)
-            self._made_of = views.extent, components
+            self._framebuffers = self._made(views.extent, components, ends)
+            self._made_of = views.extent, components, ends
         self.views, self.spectral, self.two_media = views, spectral, two_media
-        for framebuffer in (self.sums, self.ends):
-            framebuffer.viewport = (0, 0, *views.extent)
+        self.sums.viewport = (0, 0, *views.extent)
         self.sums.clear()
-        if any(view.ends for view in views):
+        if ends:
+            self.ends.viewport = self.sums.viewport
             self.ends.clear(float(CONSTANTS["NOTHING"]), depth=1.0)
 
     @property
@@ -322,7 +323,10 @@ class ShadowAtlas:
 
     @property
     def ends(self) -> moderngl.Framebuffer:
-        """Framebuffer (R32F) of metres ahead of the center where opaque surfaces end rays; with a depth buffer."""
+        """Framebuffer (R32F) of metres ahead of the center where opaque surfaces end rays; with a depth buffer.
+
+        It has one texel where none does.
+        """
         return self._framebuffers[1]
 
     @property
@@ -352,11 +356,11 @@ class ShadowAtlas:
                 attachment.release()
         self._framebuffers, self._made_of, self.held, self.views = (), None, None, None
 
-    def _made(self, extent: tuple[int, int], components: int) -> tuple[moderngl.Framebuffer, ...]:
-        gl = self._gl
+    def _made(self, extent: tuple[int, int], components: int, with_ends: bool) -> tuple[moderngl.Framebuffer, ...]:
+        gl, of_ends = self._gl, extent if with_ends else (1, 1)
         try:
-            sums, ends = (gl.texture(extent, count, dtype="f4") for count in (components, 1))
-            depth = gl.depth_renderbuffer(extent)
+            sums, ends = gl.texture(extent, components, dtype="f4"), gl.texture(of_ends, 1, dtype="f4")
+            depth = gl.depth_renderbuffer(of_ends)
         except moderngl.Error as error:
             raise RenderError(
                 "shadow maps",
@@ -368,6 +372,7 @@ class ShadowAtlas:
             ) from error
         for texture in (sums, ends):
             texture.filter = moderngl.NEAREST, moderngl.NEAREST
-        tested = gl.framebuffer([sums], depth)
+        both = gl.framebuffer([sums, ends] if with_ends else [sums])
+        tested = gl.framebuffer([sums], depth if with_ends else None)
         tested.depth_mask = False
-        return gl.framebuffer([sums]), gl.framebuffer([ends], depth), gl.framebuffer([sums, ends]), tested
+        return gl.framebuffer([sums]), gl.framebuffer([ends], depth), both, tested

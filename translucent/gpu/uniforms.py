@@ -144,6 +144,40 @@ def clip_rows(placed: PlacedScene, view: SampleView) -> Array:
     return clip
 
 
+def turned_records(
+    records: npt.NDArray[Any], placed: PlacedScene, cameras: Sequence[Camera], center: Array
+) -> npt.NDArray[Any]:
+    """(cameras, objects): contents of the Body blocks for orthographic cameras that look at a scene from outside.
+
+    Parameters
+    ----------
+    records : (objects,)
+        Of one of these cameras.
+    placed : PlacedScene
+        The scene before that camera.
+    cameras : sequence of Camera
+        All views are square.
+    center : (3,) float64
+        From which axial depths count.
+    """
+    turned = np.tile(records, (len(cameras), 1))
+    axes = np.stack([[camera.right, camera.up, camera.forward] for camera in cameras])  # (k, 3, 3)
+    half = np.array([camera.half_extent((1, 1)) for camera in cameras])
+    middles = placed.anchors + placed.scene.camera.eye
+    linear = axes[:, None] @ placed.matrices[None, :, :3, :3]  # (k, objects, 3, 3)
+    eyes = np.array([camera.eye for camera in cameras])
+    place = np.einsum("kij,knj->kni", axes, middles - eyes[:, None])
+    clip = np.zeros((*turned.shape, 4, 4))
+    clip[:, :, :2, :3], clip[:, :, :2, 3] = linear[:, :, :2] / half[:, None, :, None], place[:, :, :2] / half[:, None]
+    clip[:, :, 3, 3] = 1.0
+    turned["clip_from_offset"] = clip
+    anchored = records["axis"][:, 3] == 0.0
+    turned["axis"][:, :, :3], turned["axis"][:, :, 3] = linear[:, :, 2], np.where(anchored, 0.0, place[:, :, 2])
+    ahead = np.where(anchored, place[:, :, 2], 0.0) - np.einsum("kj,kj->k", axes[:, 2], center - eyes)[:, None]
+    turned["axial_depth_start"] = ahead / placed.media.length
+    return turned
+
+
 def _normal_matrices(placed: PlacedScene) -> Array:
     """(objects, 4, 4): matrices that transform normals of meshes to the world."""
     inverted = np.array([item.mesh.diagnosis.inverted for item in placed.scene.objects])

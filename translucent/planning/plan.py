@@ -510,7 +510,9 @@ def _with_shadows(found: RenderPlan, scene: Scene, machine: Capabilities) -> Ren
         unmodelled = [*shadows_left_out(machine.texture_units)]
     if not before and not behind:
         return found
-    shadows, narrow = (found.request.shadows, ()) if found.request.shadows or not before else usual_maps(scene)
+    shadows, narrow = found.request.shadows, tuple[Note, ...]()
+    if shadows is None and before:
+        shadows, narrow = usual_maps(scene, found.request.pixels)
     return replace(
         found,
         passes=(*before, *behind, *found.passes),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from translucent.errors import InputError
 from translucent.planning.bodies import count_of, indices, media_differ
 from translucent.planning.methods import SignedDepth
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
+from translucent.scene.grounds import ground_of
 from translucent.scene.scene import Scene
 
 #: Textures that shaders of interfaces read at most, with those of shadows. OpenGL promises 16.
@@ -18,6 +19,11 @@ UNITS_WITH_SHADOWS = 20
 
 #: Sizes that make sense: below, shadows are blots; above, no texture holds them.
 LEAST_SIZE, MOST_SIZE = 64, 8192
+
+#: Texels of a light's map across a pixel at least, where objects are nearest to the eye, and the fewest along its side.
+#: Next to four times as many, the light of a bear in 64 x 64 pixels changes by 5e-4 (root mean square), and by 0.02 at
+#: most, at the edge of its shadow.
+TEXELS_OF_PIXEL, LEAST_USUAL = 2.0, 256
 
 #: Surfaces on a ray through the bodies, on average, up to which maps are as wide as usual: a texel costs as many.
 MANY_SURFACES = 8.0
@@ -36,7 +42,8 @@ class ShadowMaps:
     ----------
     size : int
         Texels along a side of each light's map, 64 to 8192. Those of directions of the environment
-        (`Scene.environment_shadows`) have a quarter of it.
+        (`Scene.environment_shadows`) have a quarter of it. Without any choice of shadows, small pictures have maps as
+        fine as they can show.
     directions : int, optional
         Of the environment, that a pixel looks into at most: for pictures that move. Shadows are the rougher for it,
         and as bright. None: all.
@@ -65,16 +72,18 @@ class ShadowMaps:
             )
 
 
-def usual_maps(scene: Scene) -> tuple[ShadowMaps, tuple[Note, ...]]:
-    """Default shadow maps of a scene, with a note if they are narrower because rays cross many surfaces.
+def usual_maps(scene: Scene, pixels: int) -> tuple[ShadowMaps, tuple[Note, ...]]:
+    """Default shadow maps of a picture of so many pixels, with a note if rays that cross many surfaces narrow them.
+
+    They are no finer than a small picture can show; 0 are pixels that are not known.
 
     Of all lines through a box of area S, surfaces in it of area A are crossed 2 A / S times on average (Cauchy 1850).
     """
-    usual = ShadowMaps()
+    usual = ShadowMaps(_shown(scene, pixels))
     low, high = (f([item.bounds[i] for item in scene.bodies], axis=0) for i, f in enumerate((np.min, np.max)))
     box = 2.0 * float((high - low) @ np.roll(high - low, 1))
     surfaces, size = 2.0 * sum(item.area for item in scene.bodies) / box if box > 0.0 else 0.0, usual.size
-    while surfaces * size**2 > MANY_SURFACES * usual.size**2 and size > LEAST_SIZE:
+    while surfaces * size**2 > MANY_SURFACES * ShadowMaps().size ** 2 and size > LEAST_SIZE:
         size //= 2
     if size == usual.size:
         return usual, ()
@@ -83,6 +92,23 @@ def usual_maps(scene: Scene) -> tuple[ShadowMaps, tuple[Note, ...]]:
         f"{surfaces:.0f} surfaces on average; --shadow-size or shadows=tl.ShadowMaps(size=...) changes it"
     )
     return ShadowMaps(size), (Note(NoteKind.SHADOWS, text),)
+
+
+def _shown(scene: Scene, pixels: int) -> int:
+    """Texels along a side of a light's map, a power of two: as many as a picture of so many pixels can show."""
+    most, ground, camera = ShadowMaps().size, ground_of(scene), scene.camera
+    if not pixels:
+        return most
+    if camera.window is not None:  # a part of a larger picture
+        pixels, camera = int(np.prod(camera.window.whole)), replace(camera, window=None)
+    boxes = np.stack([item.bounds for item in scene.objects if ground is None or item is not ground.ground])
+    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    away = float(np.linalg.norm(np.maximum(np.maximum(low - camera.eye, camera.eye - high), 0.0)))
+    across = 2.0 * camera.half_extent((1, 1))[1] * (away if camera.fov_y is not None else 1.0)
+    needed, size = TEXELS_OF_PIXEL * float(np.linalg.norm(high - low) * np.sqrt(pixels)), LEAST_USUAL
+    while size < most and size * across < needed:
+        size *= 2
+    return size
 
 
 def shadows_left_out(units: int) -> tuple[Note, ...]:

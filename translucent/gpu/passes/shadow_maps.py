@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import weakref
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Container, Hashable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import moderngl
@@ -54,6 +54,9 @@ _GRAZING = 1e-4
 #: Passes whose sums are read where they were added up.
 _IN_PLACE = (PassName.OPAQUE, PassName.SIGNED_DEPTH, PassName.THIN_LAYER, PassName.TRANSMITTANCE)
 
+#: Most maps that are drawn at once: a window can stop in between.
+_AT_ONCE = 16
+
 #: Those of bodies without holes.
 _SUMS = (PassName.OPAQUE, PassName.SIGNED_DEPTH, PassName.TRANSMITTANCE)
 
@@ -83,12 +86,15 @@ PIXELS_OF_TEXEL = 8.0
 
 
 class MapJob(FrameJob):
-    """Map of shadows: a frame from a light, drawn into the atlas; depths count from the center of the scene.
+    """Maps of shadows: a frame from a light, drawn into the atlas; depths count from the center of the scene.
+
+    Several are drawn at once where all of them look along parallel rays, and nothing opaque ends these.
 
     Parameters
     ----------
     gl, plan, targets, resources
-    view : ShadowView
+    views : sequence of ShadowView
+        The plan has the camera of the first.
     center : (3,) float64
         Of the media.
     """
@@ -101,16 +107,28 @@ class MapJob(FrameJob):
         plan: RenderPlan,
         targets: Targets,
         resources: Resources,
-        view: ShadowView,
+        views: Sequence[ShadowView],
         center: Array,
     ) -> None:
-        self._view, scene = view, plan.scene
+        self._views, scene = tuple(views), plan.scene
+        view = self._view = self._views[0]
         self.corner = view.corner
         self.path_only, self.two_media = not resources.shadows.spectral, resources.shadows.two_media
         self.projected_depth = self.path_only and not self.two_media and view.ends and _resolves(scene)
         zero = float(scene.camera.forward @ (center - scene.camera.eye))
         placed = replace(PlacedScene.of(scene), media=AxialRange(zero, zero + 1.0))
         super().__init__(gl, plan, targets, resources, placed=placed, with_depth=self.projected_depth)
+        if len(views) > 1:
+            self.uniforms.place_before([view.camera for view in views], center)
+
+    def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
+        """Draw the objects into each of the maps."""
+        for number, view in enumerate(self._views):
+            if len(self._views) > 1:
+                self._view = view
+                self.accumulator()
+                self.uniforms.choose(number)
+            super().draw(program, objects)
 
     def roles_of(self, counts: FaceCounts) -> BodyRoles:
         """Roles of the objects, with the slots of two media."""
@@ -214,9 +232,11 @@ class ShadowMapsPass:
         assert atlas.views is not None
         center = media_center(scene)
         used = {key}
-        for view in _read(job, atlas.views, first, step):
-            if view in atlas.drawn:
-                continue
+        missing = [view for view in _read(job, atlas.views, first, step) if view not in atlas.drawn]
+        # One after the other, or some at once where only bodies are drawn, in one view as in another.
+        at_once = _AT_ONCE if {one.name for one in everything.passes}.issubset(_SUMS) else 1
+        for portion in _portions(missing, set(atlas.views.sky), at_once):
+            view = portion[0]
             if job.plan.shadows.directions is None:
                 before_making(self._gl)
             if view.size not in self._targets:
@@ -229,13 +249,13 @@ class ShadowMapsPass:
             before = plan if dark is scene else replace(plan, spectral=True), self._targets[view.size], job.resources
             try:
                 if in_place:
-                    self._add_up(MapJob(self._gl, *before, view, center))
+                    self._add_up(MapJob(self._gl, *before, portion, center))
                 else:
                     self._copy(FrameJob(self._gl, *before), view, center)
             except BaseException:
                 atlas.held = None  # half of a map looks like a whole one
                 raise
-            atlas.drawn.add(view)
+            atlas.drawn.update(portion)
         for key in self._plans.keys() - used:
             del self._plans[key]
         for size in self._targets.keys() - {view.size for view in atlas.views}:
@@ -315,6 +335,13 @@ def _read(job: FrameJob, views: ShadowViews | None, first: int, step: int) -> li
     side = None if job.any_eye or job.features.shadows_backdrop else lit_side(job.scene)
     sky = [view for view in views.sky[first::step] if side is None or view.camera.forward @ side < _GRAZING]
     return [*itertools.chain(*views.lights), *sky]
+
+
+def _portions(views: Iterable[ShadowView], sky: Container[ShadowView], most: int) -> Iterator[list[ShadowView]]:
+    """Views in portions that are drawn at once: each alone, or some of the sky in which nothing opaque is."""
+    for alone, group in itertools.groupby(views, lambda view: view.ends or view not in sky):
+        some, count = list(group), 1 if alone else most
+        yield from (some[i : i + count] for i in range(0, len(some), count))
 
 
 def _resolves(scene: Scene) -> bool:
@@ -426,10 +453,11 @@ class GroundShadowsPass:
             set_uniform(program, "ground_texels", side)
             target.clear()
             add_up(self._gl)
-            radii = dict(zip(ahead, _cell_radii(np.array(list(ahead.values()))).tolist(), strict=True))
-            for order, i in enumerate(lit):
-                set_used(program, {"number": i, "order": order, "cell_radius": radii[i]})
-                part = _footprint(views.sky[i].camera, radii[i], ground, bounds, axes, side)
+            all_radii = dict(zip(ahead, _cell_radii(np.array(list(ahead.values()))).tolist(), strict=True))
+            radii = np.array([all_radii[i] for i in lit])
+            parts = _footprints([views.sky[i].camera for i in lit], radii, ground, bounds, axes, side) if lit else []
+            for order, (i, part) in enumerate(zip(lit, parts, strict=True)):
+                set_used(program, {"number": i, "order": order, "cell_radius": float(radii[order])})
                 self._variants.draw_part(part, program, target)
             self._made_of = key
         rows = [(*row, float(row @ (center - middle))) for row in axes / np.square(axes).sum(axis=1, keepdims=True)]
@@ -486,22 +514,25 @@ def _side(job: FrameJob, bounds: Array, axes: Array) -> int:
     return min(1 << round(float(np.log2(max(texels, LEAST_SIDE)))), most)
 
 
-def _footprint(camera: Camera, radius: float, ground: Mirror, bounds: Array, axes: Array, side: int) -> Part:
-    """Texels of the ground map in the shadow of objects from one direction, with cells of this radius."""
+def _footprints(
+    cameras: Sequence[Camera], radii: Array, ground: Mirror, bounds: Array, axes: Array, side: int
+) -> list[Part]:
+    """Texels of the ground map in the shadow of objects from each direction (k), with cells of these radii (k,)."""
     middle, _ = _frame(bounds, ground)
-    half_width, half_height = camera.half_extent((1, 1))
-    ends = np.stack([half_width * camera.right, half_height * camera.up])
+    half = np.array([camera.half_extent((1, 1)) for camera in cameras])  # (k, 2)
+    pose = np.stack([camera.pose for camera in cameras])
+    across, forward, eye = pose[:, :3, :2].swapaxes(1, 2), -pose[:, :3, 2], pose[:, :3, 3]
+    corners = np.array([(x, y) for x in (-1, 1) for y in (-1, 1)])
+    blur = np.zeros(len(cameras))
     for _ in range(2):  # the second time with what shadows are blurred by where they are longest
-        points = camera.eye + np.array([(x, y) for x in (-1, 1) for y in (-1, 1)]) @ ends
-        ahead = (ground.height - points @ ground.normal) / (camera.forward @ ground.normal)
-        points = points + ahead[:, None] * camera.forward
-        longest = float(((points - bounds.mean(axis=0)) @ camera.forward).max())
-        blur = radius * max(longest, 0.0)
-        ends = np.stack([(half_width + blur) * camera.right, (half_height + blur) * camera.up])
+        points = eye[:, None] + corners @ ((half + blur[:, None])[..., None] * across)  # (k, 4, 3)
+        ahead = (ground.height - points @ ground.normal) / (forward @ ground.normal)[:, None]
+        points = points + ahead[..., None] * forward[:, None]
+        longest = np.einsum("kcj,kj->kc", points - bounds.mean(axis=0), forward).max(axis=1)
+        blur = radii * np.maximum(longest, 0.0)
     at = (points - middle) @ axes.T / np.square(axes).sum(axis=1)
     size = np.abs(at)
     place = np.where(size > 1.0, np.sign(at) * (1.0 - 0.5 / np.maximum(size, 1.0)), 0.5 * at)
-    low, high = (0.5 + 0.5 * place.min(axis=0)) * side - 1.0, (0.5 + 0.5 * place.max(axis=0)) * side + 1.0
-    left, bottom = np.clip(np.floor(low), 0, side).astype(int).tolist()
-    right, top = np.clip(np.ceil(high), 0, side).astype(int).tolist()
-    return Part(left, bottom, right, top)
+    low, high = (0.5 + 0.5 * place.min(axis=1)) * side - 1.0, (0.5 + 0.5 * place.max(axis=1)) * side + 1.0
+    edges = np.concatenate([np.clip(np.floor(low), 0, side), np.clip(np.ceil(high), 0, side)], axis=1)
+    return [Part(*row) for row in edges.astype(int).tolist()]
