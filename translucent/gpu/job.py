@@ -144,8 +144,8 @@ class UniformBuffers:
         content = np.zeros((len(cameras), *self._content.shape), np.uint8)
         records = content[..., : BODY.dtype.itemsize].view(BODY.dtype)[..., 0]
         records[:] = turned_records(self._records, self._placed, cameras, center)
-        self.bodies.orphan(content.nbytes)
-        self.bodies.write(content)
+        self.bodies.release()
+        self.bodies = self._gl.buffer(content)
 
     def choose(self, camera: int) -> None:
         """Choose one of the cameras of `place_before`, by its number."""
