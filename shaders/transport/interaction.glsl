@@ -54,7 +54,7 @@ Lobes interface_lobes(Interaction at, ObjectRow body, float bare, out vec3 emitt
     if (!at.thin_walled) { return smooth_lobes(front); }
     float through = 1.0 / max(refracted_cosine(cosine, at.ior), MIN_THIN_LAYER_COSINE);
     vec3 depth = body.extinction * through;
-#if EMISSION
+#if EMISSION == 1
     emitted = thin_wall_exitance(front, bare, depth) * emitted_radiance(body.emission, body.extinction, through);
 #endif
     return thin_wall_lobes(front, bare, depth);

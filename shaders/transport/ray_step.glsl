@@ -2,6 +2,7 @@
 // Adds the light of what ends, and leaves the ray of the stronger branch and that of the weaker one. Who includes it finds the
 // hits and follows the rays: nothing here depends on the order, nor on the pixel but by arguments. What is absorbed and emitted
 // on each segment is exact. Radiance is basic radiance, L / n^2. ROUGH: some body is rough. LIGHTS: the scene has some.
+// EMISSION: media emit along rays: 1: along these; 2: or scatter, and what straight rays find is theirs at the first interface.
 
 #include "lib/color.glsl"
 #include "lib/optics.glsl"
@@ -164,7 +165,7 @@ vec3 through_media(inout Ray ray, int effective, Hit hit, vec3 normal) {
     if (hit.object < 0) { lose(ray); }  // it has left through a hole
     Medium medium = medium_in(ray.interior, effective);
     float path = min(hit.path + ray.skipped, 1e3 * surface_reach);
-#if EMISSION
+#if EMISSION == 1
     traced_radiance += ray.throughput * emitted_radiance(medium.emission, medium.extinction, path);
 #endif
     vec3 passed = transmittance(medium.extinction * path);
@@ -417,18 +418,23 @@ int follow(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int chann
 // Light of the traced rays of a pixel with that of the lights in its first interface, where there is one. emitted: what media emit
 // along the straight ray; variance: of normals.
 vec3 with_lights(vec3 light, vec3 direction, PrimaryHit primary, vec3 emitted, float variance, bool starts_inside) {
+#if LIGHTS || EMISSION == 2
     vec3 entering = vec3(1.0);
-    if (primary.object != AIR && !starts_inside) {
+    // A loop in place of a branch: software rasterizers leave it where no pixel of a group shows an interface.
+    for (bool enters = primary.object != AIR && !starts_inside; enters; enters = false) {
         Surface surface = surface_of(vec4(float(primary.object), primary.roughness, primary.transmission, variance));
+#if EMISSION == 2
         float cosine = clamp(-dot(primary.normal, direction), 0.0, 1.0);
         entering = vec3(1.0 - interface_reflectance(cosine, surface.ior, surface.roughness)) * surface.transmission * primary.color;
         entering *= 1.0 - coat_reflectance(surface.clearcoat, cosine);
+#endif
 #if LIGHTS
         light += coated_highlights(primary.point, primary.normal, direction, surface, variance);
 #endif
     }
-#if !EMISSION
+#if EMISSION == 2
     light += entering * emitted;
+#endif
 #endif
     return min(light, vec3(NOTHING));
 }

@@ -96,7 +96,7 @@ bool is_thin_wall(ObjectRow body) {
 // Thin wall that only absorbs and emits.
 void pass_absorber(ObjectRow wall, float cosine, inout vec3 emitted, inout vec3 throughput) {
     float through = 1.0 / max(refracted_cosine(cosine, wall.ior), MIN_THIN_LAYER_COSINE);
-#if EMISSION
+#if EMISSION == 1
     emitted += throughput * emitted_radiance(wall.emission, wall.extinction, through);
 #endif
     throughput *= transmittance(wall.extinction * through);

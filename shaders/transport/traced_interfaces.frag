@@ -2,7 +2,7 @@
 // always followed, the weaker one FORKS times on a path (the first mirror image is free), else it is looked up in the environment;
 // so are both at the last of `most_interfaces`. The rasterizer has found the first interface. adaptive: only samples of a pixel that
 // are worth it; with the square of their luminance in place of the transmittance. GENERATIONS: the light of the rays has been summed
-// up, see step_rays.comp. Row 0 of the output is the top row.
+// up, see step_rays.comp, and pixels without an interface are drawn as well. Row 0 of the output is the top row.
 
 #if (MIRROR || ROUGH) && !MICROFACETS
 #error rough interfaces and mirrors of the ground take random microfacets: MICROFACETS is 1

@@ -10,6 +10,7 @@ from translucent.gpu.context import require_interfaces
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import bind_light, interface_shadow_switches
 from translucent.gpu.passes.variants import Variants, background_switches, coat_switches, look_switches
+from translucent.gpu.placement import Part
 from translucent.gpu.shaders import set_uniform
 from translucent.planning.interfaces import picture_cuts
 from translucent.planning.passes import PassSpec
@@ -93,7 +94,7 @@ class NoInterface:
         self._variants = Variants(gl, "geometry/fullscreen.vert", "shade/no_interface.frag", *_PLAIN_SAMPLERS)
 
     def draw(self, job: FrameJob, framebuffer: moderngl.Framebuffer, blending: int) -> None:
-        """Shade all pixels without an interface.
+        """Shade all pixels without an interface, by one program, as each takes time to compile.
 
         Leaves a depth test that lets a program for interfaces, drawn next, pass where there is one. Where it returned
         at once instead, a software rasterizer would go through all of it nevertheless.
@@ -107,17 +108,16 @@ class NoInterface:
         if job.features.has_opaque:
             textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets["opaque"].color_attachments
         self._variants.bind(**textures)
-        background = {"OPAQUE": job.features.has_opaque, "SEEN_MAP": bool(maps)}
-        job.gl.enable_only(blending)
-        rest = self._variants.program(REST=True, ONE_INTERFACE=False, APART=False, **background)
-        self._variants.draw_rest(job, rest, framebuffer, top_first=True)
+        switches = {"OPAQUE": job.features.has_opaque, "SEEN_MAP": bool(maps), "REST": not job.covered}
         if job.covered:
+            switches |= {"ONE_INTERFACE": job.features.one_interface, "APART": job.bent_apart}
             job.gl.enable_only(blending | moderngl.DEPTH_TEST)
-            job.gl.depth_func = "1"
-            switches = {"ONE_INTERFACE": job.features.one_interface, "APART": job.bent_apart}
-            plain = self._variants.program(REST=False, **switches, **background)
-            self._variants.draw_covered(job, plain, framebuffer, top_first=True)
-            job.gl.depth_func = "<"
+        else:
+            switches |= {"ONE_INTERFACE": False, "APART": False}
+            job.gl.enable_only(blending)
+        job.gl.depth_func = "1"
+        self._variants.draw_part(Part(0, 0, *job.targets.size), self._variants.program(**switches), framebuffer)
+        job.gl.depth_func = "<"
 
 
 _SAMPLERS = (

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from translucent.formulas.sampling import FOOTPRINT_STEP, MOST_POINTS, sobol_points
 from translucent.gpu.context import require_interfaces
+from translucent.gpu.features import FrameFeatures
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.interfaces import NoInterface
 from translucent.gpu.passes.opaque import bind_light, interface_shadow_switches
@@ -95,11 +96,13 @@ class TracedInterfacesPass:
         blending = moderngl.BLEND if sums else moderngl.NOTHING
         gl.blend_equation = moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE
-        record = interior_at_eye(job)
+        mirror, by_generations = job.mirror, job.plan.hits == "embree"
+        # The program that adds the light of generations of rays shades the pixels without an interface, too.
+        shades_all = by_generations and bool(job.covered) and not (job.bending or job.bent_apart)
+        by_depth = not (shades_all or any(interior_at_eye(job)))
         gl.enable_only(blending)
-        mirror = job.mirror
-        if not any(record):
-            if job.bending and job.plan.hits != "embree":
+        if by_depth:
+            if job.bending and not by_generations:
                 self._mark_unsettled(job)
             elif not job.bending:
                 self._no_interface.draw(job, framebuffer, blending)
@@ -124,15 +127,20 @@ class TracedInterfacesPass:
             **_ground_shadows(job, switches),
             **_footprint(job),
         }
-        if mirror is not None and not any(record):
+        if mirror is not None and (by_depth or shades_all):
             # What is drawn next finds zeros. Software rasterizers compile a program again for every other state.
-            gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
+            if shades_all and not sums:
+                framebuffer.clear()
+            gl.enable_only(moderngl.BLEND | (moderngl.DEPTH_TEST if by_depth else moderngl.NOTHING))
         self._draw(job, job.covered.flipped(job.targets.size[1]), framebuffer, "unsettled", switches, values)
+        if shades_all:
+            program = self._with_sums.program(**switches, GENERATIONS=True)
+            self._with_sums.draw_rest(job, program, framebuffer, top_first=True)
         if mirror is not None and (part := mirrored_part(job, mirror)):
             values |= _mirroring(job.scene, mirror)
             if job.bending:
                 framebuffer = job.targets["mirrored"]
-            else:
+            elif not shades_all:
                 # The state of the first interfaces, and depths that let all pass.
                 gl.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
                 framebuffer.color_mask = ((False,) * 4,) * 2
@@ -234,7 +242,7 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
         "FROM_EYE": job.placed.starts_inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
         **ray_switches(job),
         "TEXTURED": job.features.textured,
-        "EMISSION": job.features.emits and not job.features.scatters,
+        "EMISSION": _emission(job.features),
         "LAYERED": any(treatment_of(body) is Treatment.LAYER for body in scene.bodies),
         "DIFFUSED": diffused,
         "MICROFACETS": mirror or rough,
@@ -254,6 +262,13 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
         "FOOTPRINTS": environment.kind == "image",
         **coat_switches(scene.objects),
     }
+
+
+def _emission(features: FrameFeatures) -> int:
+    """0 if no medium emits or scatters light along rays; 1 if traced rays find that light, 2 if straight ones have."""
+    if features.emits and not features.scatters:
+        return 1
+    return 2 if features.scatters or features.marches else 0
 
 
 def _mirroring(scene: Scene, mirror: Mirror) -> dict[str, Any]:

@@ -72,9 +72,11 @@ class TransmittancePass:
             "OPAQUE": features.has_opaque,
         }
         program = self._variants.program(**switches, **paths)
-        # Where there is no medium no path is read, and all of it is 0.
+        # Where there is no medium no path is read, and all of it is 0. So are sums: one program does for both where
+        # interfaces take most of the time.
         without = {name: False for name in paths if name != "SPECTRAL" or not job.compact}
-        empty = self._variants.program(**switches, **(paths | without))
+        one_program = features.has_surfaces and not job.plan.ordered
+        empty = program if one_program else self._variants.program(**switches, **(paths | without))
         self._set_loose(job, (program, empty))
         self._variants.draw_covered(job, program, into, top_first=True)
         self._variants.draw_rest(job, empty, into, top_first=True)
