@@ -273,10 +273,21 @@ def test_what_nobody_has_timed_yet_is_drawn_coarsely_and_traced_rays_most_of_all
         scene = showcase(Box().tessellate(), tl.Medium(5.0, ior=ior), stage="none")
         pace, found = StepTimes(), plan(scene)
         factors[name] = [pace.stride(found, 0.045)]
-        for seconds in (5.0, 4.0, 0.01):  # steps of 8 x 8 take 78 ms, 62 ms
-            pace.note(found, seconds)
+        for seconds, stride in ((0.200, 16), (0.020, 16), (0.003, 8), (0.003, 4)):  # the next ones are twice as fine
+            pace.note(found, seconds, stride)
             factors[name].append(pace.stride(found, 0.045))
-    assert factors == {"clear": [16, 16, 8, 1], "glass": [16, 16, 8, 1]}
+    assert factors == {"clear": [16, 16, 8, 4, 2], "glass": [16, 16, 8, 4, 2]}
+
+
+def test_fewer_larger_steps_are_drawn_at_rest_where_small_ones_take_long_for_few_pixels() -> None:
+    found, budget = plan(showcase(Box().tessellate(), tl.Medium(5.0, ior=1.5), stage="none")), 0.045
+    for each, whole, stride in ((0.012, 0.9, 4), (0.012, 1.4, 8)):  # one of 4 x 4 takes 68, 100 ms
+        pace = StepTimes()
+        for factor in (16, 8):
+            for late in (0.3, 0.0, 0.001):  # the first one compiles
+                pace.note(found, each + whole / factor**2 + late, factor)
+        assert pace.known(found, 4) == pytest.approx(each + whole / 16, rel=0.03)
+        assert pace.stride(found, budget) == stride
 
 
 @pytest.mark.parametrize(

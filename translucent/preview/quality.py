@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
@@ -36,12 +37,7 @@ from translucent.scene.scene import Scene
 if TYPE_CHECKING:
     from translucent.diffusion.cache import FieldCache, Fields
 
-
 Factor = TypeVar("Factor", int, float)
-
-#: Budgets that a step of the largest stride but one may take: a whole picture of the largest takes twice as long, since
-#: each step costs the window a frame.
-OVERDRAWN = 1.5
 
 #: Recent frames, whose quickest measures the rest of a window; seconds of it that cost drawing nothing; and the least
 #: fraction of its budget that drawing keeps.
@@ -124,34 +120,68 @@ class StepTiming:
 
 
 class StepTimes:
-    """Seconds that whole pictures took, by the method and passes of their plans, and how coarse quick ones must be."""
+    """Seconds that steps take, by the method and passes of their plans, and how coarse quick ones must be.
+
+    A step takes some time however few pixels it has, and more in proportion to their number. Two sizes tell both; until
+    then, most of a step's time counts as fixed, so that another size is tried. None is tried that is more than twice as
+    fine as one that was timed.
+    """
 
     def __init__(self) -> None:
-        self._seconds: dict[tuple[str, ...], float] = {}
+        self._last: dict[tuple[str, ...], tuple[float, float]] = {}  # factor and seconds
+        self._least: dict[tuple[str, ...], dict[float, float]] = {}  # seconds of the quickest step, by its factor
 
-    def note(self, plan: RenderPlan, seconds: float) -> None:
-        """Record the time that a whole picture would have taken."""
-        known = self._seconds.get(_cost_key(plan))
+    def note(self, plan: RenderPlan, seconds: float, factor: float = 1.0) -> None:
+        """Record the time of a step that is coarser by a factor."""
+        key, before = _cost_key(plan), self.known(plan, factor)
+        least = self._least.setdefault(key, {})
+        least[factor] = min(seconds, least.get(factor, seconds))
         # The first of its type compiles shaders.
-        self._seconds[_cost_key(plan)] = seconds if not known or seconds < known else 0.8 * known + 0.2 * seconds
+        self._last[key] = factor, seconds if not before or seconds < before else 0.8 * before + 0.2 * seconds
 
-    def known(self, plan: RenderPlan) -> float:
-        """Seconds of a whole picture; 0 if there was none."""
-        return self._seconds.get(_cost_key(plan), 0.0)
+    def known(self, plan: RenderPlan, factor: float = 1.0) -> float:
+        """Seconds that a step is expected to take; 0 if there was none."""
+        if (key := _cost_key(plan)) not in self._last:
+            return 0.0
+        last, seconds = self._last[key]
+        fixed = min(self._fixed(plan), 0.9 * seconds)
+        return fixed + (seconds - fixed) * (last / factor) ** 2
 
-    def factor(self, plan: RenderPlan, factors: Sequence[Factor], budget: float) -> Factor:
+    def _fixed(self, plan: RenderPlan) -> float:
+        """Seconds of a step without pixels, by the finest and the coarsest that were timed."""
+        least = self._least[_cost_key(plan)]
+        fine, coarse = min(least), max(least)
+        if fine == coarse:
+            return least[fine]
+        return max((coarse**2 * least[coarse] - fine**2 * least[fine]) / (coarse**2 - fine**2), 0.0)
+
+    def factor(self, plan: RenderPlan, factors: Sequence[float], budget: float) -> float:
         """Smallest factor of reduction at which a picture is expected to be drawn within so many seconds."""
-        if not (known := self.known(plan)):
+        if not self.known(plan):
             return factors[-1 if plan.has(PassName.SHADOW_MAPS) or plan.has(PassName.TRACED) else -2]
-        return next((factor for factor in factors if known / factor**2 <= budget), factors[-1])
+        tried = self._tried(plan, factors)
+        return next((factor for factor in tried if self.known(plan, factor) <= budget), factors[-1])
 
     def stride(self, plan: RenderPlan | None, budget: float) -> int:
-        """Stride of a progressive picture whose steps are expected to take so many seconds; the largest if unknown."""
-        *usual, largest = STRIDES
+        """Stride of a picture at rest whose steps are expected to take so many seconds; the largest if unknown.
+
+        They may take longer by the factor by which the whole picture is there sooner than by the next larger stride:
+        each step draws all triangles, and costs the window a frame.
+        """
         if plan is None:
-            return usual[0]
-        known = self.known(plan)
-        return largest if not known or known / usual[-1] ** 2 > OVERDRAWN * budget else self.factor(plan, usual, budget)
+            return STRIDES[0]
+        chosen = STRIDES[-1]
+        for finer in self._tried(plan, STRIDES[:-1])[::-1]:
+            before, after = (stride**2 * (self.known(plan, stride) + FREE) for stride in (chosen, finer))
+            if self.known(plan, finer) > budget * before / after:
+                break
+            chosen = finer
+        return chosen
+
+    def _tried(self, plan: RenderPlan, factors: Sequence[Factor]) -> Sequence[Factor]:
+        """Factors that may be tried, of a list from fine to coarse."""
+        finest = min(self._least.get(_cost_key(plan), ()), default=math.inf)
+        return [factor for factor in factors if 2 * factor >= finest]
 
 
 def _cost_key(plan: RenderPlan) -> tuple[str, ...]:

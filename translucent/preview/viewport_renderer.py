@@ -218,7 +218,7 @@ class ViewportRenderer:
             self._rendered = target
             self.viewport.restart()
             self.presenter.truth = None
-            self._strides.begin(self.plans, self._left)
+            self._strides.begin(self.plans, self.budget)
             self._moving, self.simpler = None, ""
             if self._compiler is not None and self._compiler.budget.postpones and unsmoothed(self._drawn_plans):
                 self._postpone(workspace, target)
@@ -251,9 +251,8 @@ class ViewportRenderer:
         request = replace(self.quality.request, shadows=shadows)
         if shadows is not None:
             self._moving = self.renderer.plan_requested(scene, request)
-        slowest = self._left * COARSEST_TRACED**2
-        plans = usual, self._moving or usual
-        if any(plan.has(PassName.TRACED) and self._times.known(plan) > slowest for plan in plans):
+        traced = [plan for plan in (usual, self._moving or usual) if plan.has(PassName.TRACED)]
+        if any(self._times.known(plan, COARSEST_TRACED) > self._left for plan in traced):
             request = replace(request, interfaces=SCREEN)
             self._moving = self.renderer.plan_requested(scene, request)
         begun, factor = time.perf_counter(), self._times.factor(self._moving or usual, FACTORS, self._left)
@@ -285,7 +284,7 @@ class ViewportRenderer:
         self.simpler, begun = "", time.perf_counter()
         self.viewport.step(side, plan, stride, max(samples, 1), lens=self._lens)
         self._finish(side, plan, stride, begun)
-        if self._strides.corrected(side, plan, drawn + 1, self._left):
+        if self._strides.corrected(side, plan, drawn + 1, self.budget):
             self.viewport.restart(side)
         return True
 
@@ -315,7 +314,7 @@ class ViewportRenderer:
         """Wait for a step, and record its time."""
         self.renderer.gpu.context.gl.finish()
         wall = time.perf_counter() - begun
-        self._times.note(plan, wall * stride * stride)
+        self._times.note(plan, wall, stride)
         self.timings[side] = StepTiming(wall, self.renderer.gpu.pass_seconds(), 1.0 / stride**2)
 
     def probe(self, x: int, y: int, side: int = 0) -> PixelProbe | None:

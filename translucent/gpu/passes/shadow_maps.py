@@ -399,15 +399,15 @@ def _map_key(job: FrameJob) -> ShadowMapKey:
 class GroundShadowsPass:
     """Fraction of the environment's light that bodies take from a ground; see ``shaders/shade/ground_shadows.frag``.
 
-    The map stays until what it is made of changes.
+    The map stays until what it is made of changes. A window has another one of few directions, while things move.
     """
 
     def __init__(self, gl: moderngl.Context) -> None:
         self._gl = gl
         samplers = "shadow_sums", "shadow_ends"
         self._variants = Variants(gl, "geometry/fullscreen.vert", "shade/ground_shadows.frag", *samplers)
-        self._target: moderngl.Framebuffer | None = None
-        self._made_of: Hashable = None
+        self._targets: dict[bool, moderngl.Framebuffer] = {}  # of few directions, of all
+        self._made_of: dict[bool, Hashable] = {}
 
     def run(
         self, job: FrameJob, ground: Mirror, irradiance: Array, directions: Iterable[int], made_of: Hashable
@@ -433,11 +433,11 @@ class GroundShadowsPass:
         ahead = {i: views.sky[i].camera.forward for i in directions}
         cosines = {i: -float(ground.normal @ forward) for i, forward in ahead.items()}
         lit = [i for i, cosine in cosines.items() if cosine > 0.0]
-        side = _side(job, bounds, axes)
-        target = self._sized(side)
+        side, few = _side(job, bounds, axes), job.plan.shadows.directions is not None
+        target = self._sized(side, few)
         key = made_of, irradiance.tobytes(), tuple(lit), middle.tobytes(), axes.tobytes()
-        if key != self._made_of or job.any_eye:  # each recording has the map, which media change
-            self._made_of = None
+        if key != self._made_of.get(few) or job.any_eye:  # each recording has the map, which media change
+            self._made_of[few] = None
             job.resources.shadows.use(self._variants.units)
             program = self._variants.program(**shadow_switches(True, job.resources))
             values = {
@@ -459,22 +459,24 @@ class GroundShadowsPass:
             for order, (i, part) in enumerate(zip(lit, parts, strict=True)):
                 set_used(program, {"number": i, "order": order, "cell_radius": float(radii[order])})
                 self._variants.draw_part(part, program, target)
-            self._made_of = key
+            self._made_of[few] = key
         rows = [(*row, float(row @ (center - middle))) for row in axes / np.square(axes).sum(axis=1, keepdims=True)]
         plane = *ground.normal.tolist(), ground.height - float(ground.normal @ center)
         return GroundShadows(scene.objects.index(ground.ground), target.color_attachments[0], tuple(rows), plane)
 
-    def _sized(self, side: int) -> moderngl.Framebuffer:
-        """Framebuffer of the map, so many texels wide."""
-        if self._target is None or self._target.size != (side, side):
-            if self._target is not None:
-                self._target.color_attachments[0].release()
-                self._target.release()
+    def _sized(self, side: int, few: bool) -> moderngl.Framebuffer:
+        """Framebuffer of a map, so many texels wide."""
+        held = self._targets.get(few)
+        if held is None or held.size != (side, side):
+            if held is not None:
+                held.color_attachments[0].release()
+                held.release()
             texture = self._gl.texture((side, side), 4, dtype="f4")
             texture.filter = moderngl.LINEAR, moderngl.LINEAR
             texture.repeat_x = texture.repeat_y = False
-            self._target, self._made_of = self._gl.framebuffer([texture]), None
-        return self._target
+            held = self._targets[few] = self._gl.framebuffer([texture])
+            self._made_of[few] = None
+        return held
 
 
 def _bounds(scene: Scene, ground: Mirror) -> Array:
