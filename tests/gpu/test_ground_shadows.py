@@ -11,6 +11,7 @@ import pytest
 
 import translucent as tl
 from translucent.geometry.solids import Box, Sphere
+from translucent.gpu.passes import shadow_maps
 
 Array = npt.NDArray[np.float64]
 
@@ -98,6 +99,19 @@ def test_what_is_far_away_is_lit_and_long_shadows_end_softly(renderer: tl.Render
     frame = renderer.render(scene, (60, 60))
     edge = np.concatenate([frame.radiance[0], frame.radiance[-1], frame.radiance[:, 0], frame.radiance[:, -1]])
     np.testing.assert_allclose(edge, 1.0, atol=2e-3)
+
+
+def test_a_view_that_moves_and_rests_in_turns_makes_no_map_anew(
+    renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While a window's view moves, few directions stand for all: their map of the ground is kept beside that of all."""
+    made, footprints = [], shadow_maps._footprints
+    monkeypatch.setattr(shadow_maps, "_footprints", lambda *given: made.append(len(given[0])) or footprints(*given))
+    ball = Sphere(center=(0.0, 1.2, 0.0), radius=1.0).tessellate(16)
+    for directions in (None, 8, None, 8):
+        light_left(renderer, ball, directions=32, shadows=tl.ShadowMaps(256, directions=directions))
+    all_above, few_above = made
+    assert 0 < few_above < all_above
 
 
 def test_media_and_light_change_the_map_and_nothing_is_kept_of_others(renderer: tl.Renderer) -> None:
