@@ -60,26 +60,24 @@ vec3 irradiance_reaching(int light, LightSample arriving, vec3 point, vec3 norma
 }
 
 // Microfacets that reflect the lights, as far as these reach them.
-vec3 highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float alpha) {
+vec3 highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float alpha, vec3 variance) {
     vec3 sum = vec3(0.0);
     float cos_view = max(-dot(normal, ray), 1e-3);
     for (int light = 0; light < light_count; ++light) {
         LightSample arriving = light_at(light, point);
-        float cos_light = dot(normal, arriving.towards);
-        if (cos_light <= 0.0) { continue; }
-        vec4 from = highlight_from(arriving.towards, arriving.disc, reflected_direction(ray, normal), alpha, cos_view);
-        vec3 half_vector = normalize(from.xyz - ray);
-        vec3 reflected = reflected_by_facets(surface, max(dot(half_vector, from.xyz), 0.0))
-            * microfacet_value(dot(half_vector, normal), cos_light, cos_view, alpha);
-        reflected *= cos_light * from.w;
+        if (dot(normal, arriving.towards) <= 0.0) { continue; }
+        float cos_facet;
+        float value = highlight_value(arriving, normal, ray, cos_view, alpha, variance, cos_facet);
+        vec3 reflected = value * reflected_by_facets(surface, cos_facet);
         if (max(reflected.r, max(reflected.g, reflected.b)) > FAINTEST_HIGHLIGHT) { sum += reflected * irradiance_reaching(light, arriving, point, normal); }
     }
     return sum;
 }
 
-// The same with its clear coat. variance: of the normals within the pixel.
-vec3 coated_highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float variance) {
-    vec3 sum = highlights(point, normal, ray, surface, highlight_alpha(surface.roughness, variance));
+// The same with its clear coat. stored: variance of the normals within the pixel.
+vec3 coated_highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float stored) {
+    vec3 variance = unpacked_variance(stored);
+    vec3 sum = highlights(point, normal, ray, surface, surface.roughness * surface.roughness, variance);
 #if CLEAR_COAT
     if (surface.clearcoat.x == 0.0) { return sum; }
     Surface coat = surface;
@@ -87,7 +85,7 @@ vec3 coated_highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float
     coat.thin_walled = false;
     coat.film = vec3(0.0, 1.0, 0.0);
     sum *= 1.0 - coat_reflectance(surface.clearcoat, clamp(-dot(normal, ray), 0.0, 1.0));
-    sum += surface.clearcoat.x * highlights(point, normal, ray, coat, highlight_alpha(surface.clearcoat.y, variance));
+    sum += surface.clearcoat.x * highlights(point, normal, ray, coat, surface.clearcoat.y * surface.clearcoat.y, variance);
 #endif
     return sum;
 }

@@ -36,7 +36,7 @@ layout(location = 1) out vec4 behind;
 
 void main() {
     // All that takes derivatives comes first: they are undefined where a neighbor has been discarded.
-    OpaqueSurface surface = opaque_surface_at(color.rgb, normalize(world_normal), from_eye, surface_uv, vertex_color);
+    OpaqueSurface surface = opaque_surface_at(color.rgb, world_normal, from_eye, surface_uv, vertex_color);
     if (surface.is_hole || axial < axial_start) { discard; }
 #if OPAQUE
     // What lies on an opaque surface is visible, also where rounding puts it behind.

@@ -62,7 +62,7 @@ vec3 diffuse_radiance(vec3 normal) {
 
 void main() {
 #if SURFACE
-    OpaqueSurface surface = opaque_surface_at(color.rgb, normalize(world_normal), from_eye, surface_uv, vertex_color);
+    OpaqueSurface surface = opaque_surface_at(color.rgb, world_normal, from_eye, surface_uv, vertex_color);
     if (surface.is_hole || (opaque_one_sided == 1.0 && !gl_FrontFacing)) { discard; }
 #endif
     opaque_axial_depth = axial * axial_depth_scale + axial_depth_start;

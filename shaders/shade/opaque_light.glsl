@@ -20,7 +20,7 @@ struct OpaqueSurface {
     float passed_share; // and without: what the base does not reflect
     vec3 emitted;
     vec3 normal;        // unit, towards the side that the mesh calls outside
-    float variance;     // of normals within a pixel
+    vec3 variance;      // of normals within a sample, see normal_variance.glsl
     float opacity;      // of texture and vertices
     float unoccluded;   // fraction of the light of the environment that reaches it
     bool is_hole;
@@ -38,8 +38,9 @@ struct OpaqueBsdf {
     float metallic;
     vec3 base;           // albedo of the base on this side, below the dielectric
     vec3 passed;         // fraction of light on the other side
-    float alpha;         // of the microfacets in which lights are mirrored,
+    float alpha;         // of its microfacets,
     float coat_alpha;    // and of those of the clear coat
+    vec3 variance;       // of normals within a sample, see normal_variance.glsl
     float coat_weight;
 };
 
@@ -66,12 +67,13 @@ OpaqueBsdf opaque_bsdf(OpaqueSurface surface, float cos_view) {
     vec3 below = (1.0 - surface.metallic) * (1.0 - bsdf.dielectric.albedo);
     bsdf.base = below * (surface.base * (1.0 - surface.passed_share));
     bsdf.passed = below * surface.passed;
-    bsdf.alpha = highlight_alpha(surface.roughness, surface.variance);
+    bsdf.alpha = surface.roughness * surface.roughness;
+    bsdf.variance = surface.variance;
 #if CLEAR_COAT
     bsdf.coat = clearcoat_layer(surface.clearcoat, cos_view);
     bsdf.coat_weight = surface.clearcoat.x;
     bsdf.coated = surface.clearcoat.x * bsdf.coat.albedo.r;
-    bsdf.coat_alpha = highlight_alpha(surface.clearcoat.y, surface.variance);
+    bsdf.coat_alpha = surface.clearcoat.y * surface.clearcoat.y;
 #else
     bsdf.coat = bsdf.dielectric;
     bsdf.coat_weight = bsdf.coated = bsdf.coat_alpha = 0.0;
@@ -79,22 +81,16 @@ OpaqueBsdf opaque_bsdf(OpaqueSurface surface, float cos_view) {
     return bsdf;
 }
 
-// Evaluate its microfacets without Fresnel's reflectance. away: (1 - cos)^5 of the angle to facets that mirror the light.
-float facets_value(LightSample arriving, vec3 normal, vec3 to_eye, float cos_view, float cos_light, float alpha, out float away) {
-    vec4 from = highlight_from(arriving.towards, arriving.disc, reflected_direction(-to_eye, normal), alpha, cos_view);
-    vec3 half_vector = normalize(from.xyz + to_eye);
-    away = pow(1.0 - clamp(dot(half_vector, from.xyz), 0.0, 1.0), 5.0);
-    return microfacet_value(dot(half_vector, normal), cos_light, cos_view, alpha) * from.w;
-}
-
-// Evaluate it for light from the front. to_eye: unit vector to the eye.
-vec3 opaque_value(OpaqueBsdf bsdf, vec3 normal, vec3 to_eye, LightSample arriving, float cos_view, float cos_light) {
-    float away;
-    float facets = facets_value(arriving, normal, to_eye, cos_view, cos_light, bsdf.alpha, away);
+// Evaluate it for light from the front, times the cosine of that. ray: unit, from the eye.
+vec3 opaque_value(OpaqueBsdf bsdf, vec3 normal, vec3 ray, LightSample arriving, float cos_view, float cos_light) {
+    float cos_facet;
+    float facets = highlight_value(arriving, normal, ray, cos_view, bsdf.alpha, bsdf.variance, cos_facet);
+    float away = pow(1.0 - min(cos_facet, 1.0), 5.0);
     vec3 reflected = mix(layer_reflectance(bsdf.dielectric, away), layer_reflectance(bsdf.metal, away), bsdf.metallic);
-    vec3 value = reflected * facets + bsdf.base / PI;
+    vec3 value = reflected * facets + bsdf.base * (cos_light / PI);
 #if CLEAR_COAT
-    facets = facets_value(arriving, normal, to_eye, cos_view, cos_light, bsdf.coat_alpha, away);
+    facets = highlight_value(arriving, normal, ray, cos_view, bsdf.coat_alpha, bsdf.variance, cos_facet);
+    away = pow(1.0 - min(cos_facet, 1.0), 5.0);
     value = (1.0 - bsdf.coated) * value + bsdf.coat_weight * layer_reflectance(bsdf.coat, away) * facets;
 #endif
     return value;
@@ -127,7 +123,7 @@ vec3 opaque_radiance_of(OpaqueSurface surface, vec3 normal, vec3 ray, vec3 point
         vec3 irradiance = arriving.irradiance;
         if (cos_light > 0.0 || surface.passed_share > 0.0) { irradiance *= light_reaching(light, point, normal); }
         if (cos_light > 0.0) {
-            sum += opaque_value(bsdf, normal, -ray, arriving, cos_view, cos_light) * cos_light * irradiance;
+            sum += opaque_value(bsdf, normal, ray, arriving, cos_view, cos_light) * irradiance;
         } else {
             sum -= (1.0 - bsdf.coated) * bsdf.passed / PI * cos_light * irradiance;
         }

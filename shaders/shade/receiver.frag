@@ -27,7 +27,7 @@ layout(location = 1) out vec4 receiver_normal;  // unit, to the side that the me
 
 void main() {
 #if SURFACE
-    OpaqueSurface surface = opaque_surface_at(color.rgb, normalize(world_normal), from_eye, surface_uv, vertex_color);
+    OpaqueSurface surface = opaque_surface_at(color.rgb, world_normal, from_eye, surface_uv, vertex_color);
     if (surface.is_hole || (opaque_one_sided == 1.0 && !gl_FrontFacing)) { discard; }
 #endif
     if (axial < axial_start) { discard; }  // behind an orthographic picture

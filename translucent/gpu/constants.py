@@ -186,5 +186,6 @@ CONSTANTS: dict[str, str] = {
     **{f"{name.upper()}_BINDING": str(point) for name, point in STORAGE_BINDINGS.items()},
     "COMPUTE_GROUP": str(COMPUTE_GROUP),
     "SMALLEST_HIGHLIGHT": "1e-3",  # alpha of the microfacets in which points of light are mirrored
+    "LEAST_VISIBLE": "0.25",  # fraction of an average over a sample by which a highlight at a silhouette is divided
     "FAINTEST_HIGHLIGHT": "1e-6",  # of a light's irradiance, in 1/sr, for which occluders are not looked for
 }

@@ -11,7 +11,7 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import bind_light, interface_shadow_switches
 from translucent.gpu.passes.variants import Variants, background_switches, coat_switches, look_switches
 from translucent.gpu.placement import Part
-from translucent.gpu.shaders import set_uniform
+from translucent.gpu.shaders import set_uniform, set_used
 from translucent.planning.interfaces import picture_cuts
 from translucent.planning.passes import PassSpec
 from translucent.scene.surface import SMOOTH, TEXTURE_FIELDS, Surface
@@ -70,6 +70,7 @@ class InterfacesPass:
                 job.resources.textures.bind(surface, program, len(_DRAWN_SAMPLERS))
                 set_uniform(program, "surface_color", (*np.asarray(surface.color), surface.transmission))
                 set_uniform(program, "surface_roughness", surface.roughness)
+                set_used(program, {"sample_area": 1.0 / job.samples})
                 held = program, surface
             if holes:
                 set_uniform(program, "hole_below", surface.alpha_cutoff)

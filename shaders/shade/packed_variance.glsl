@@ -1,0 +1,27 @@
+// A symmetric matrix of two rows, as a picture stores it in one number: see normal_variance.glsl.
+
+const float LEAST_PACKED = 24.0;  // octaves below 1
+
+// Projection along a ray onto the plane across it, in two axes.
+mat3x2 projection(vec3 ray) {
+    vec3 right = normalize(abs(ray.x) < 0.7 ? cross(ray, vec3(1.0, 0.0, 0.0)) : cross(ray, vec3(0.0, 1.0, 0.0)));
+    return transpose(mat2x3(right, cross(ray, right)));
+}
+
+// By 8 bits each: logarithm of the larger eigenvalue, root of the ratio of both, and the angle of the axis.
+float packed_variance(vec3 variance) {
+    float middle = 0.5 * (variance.x + variance.z), aside = 0.5 * (variance.x - variance.z), off = length(vec2(aside, variance.y));
+    if (middle < exp2(-LEAST_PACKED)) { return 0.0; }
+    float larger = clamp((log2(middle + off) / LEAST_PACKED + 1.0) * 255.0, 1.0, 255.0);
+    float ratio = sqrt(clamp((middle - off) / (middle + off), 0.0, 1.0)) * 255.0;
+    float angle = off > 0.0 ? fract(0.5 * atan(variance.y, aside) / PI) * 256.0 : 0.0;
+    return dot(floor(vec3(larger, ratio, angle) + 0.5), vec3(65536.0, 256.0, 1.0));
+}
+
+vec3 unpacked_variance(float stored) {
+    if (stored == 0.0) { return vec3(0.0); }
+    vec3 bytes = mod(floor(stored * vec3(1.0 / 65536.0, 1.0 / 256.0, 1.0)), 256.0);
+    float larger = exp2((bytes.x / 255.0 - 1.0) * LEAST_PACKED), smaller = larger * bytes.y * bytes.y / (255.0 * 255.0);
+    vec2 axis = vec2(cos(bytes.z * PI / 256.0), sin(bytes.z * PI / 256.0));
+    return vec3(smaller, 0.0, smaller) + (larger - smaller) * vec3(axis.x * axis.x, axis.x * axis.y, axis.y * axis.y);
+}
