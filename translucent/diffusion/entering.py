@@ -94,26 +94,25 @@ def windings_at(scene: Scene, points: Array, directions: Array) -> npt.NDArray[n
 
 def _crossings(body: Object, points: Array, directions: Array) -> tuple[Integers, Array, Array]:
     """Lines (n,) of k that cross a face of a body ahead, metres to there, and 1 where they leave it, -1 to enter."""
-    mesh = body.mesh
+    mesh, linear = body.mesh, body.matrix[:3, :3]
     caster = ray_caster_of(mesh)
-    into = np.linalg.inv(body.matrix[:3, :3])
-    origins, local_directions = (points - body.matrix[:3, 3]) @ into.T, directions @ into.T
-    places, towards = (origins - caster.center) / caster.radius, unit(local_directions)
     # Most lines pass the ball around the body.
-    along, square = dot(places, towards), dot(places, places)
-    near = np.flatnonzero((square - along**2 <= _BALL) & ((along < 0.0) | (square <= _BALL)))
-    of, face = caster.candidates(
-        places[near], towards[near], np.full(len(near), MOST_FACES), np.ones(len(mesh.faces), dtype=bool)
-    )
-    line = near[of]
+    reach = _BALL * (float(np.linalg.norm(linear, 2)) * caster.radius) ** 2
+    middle = body.matrix[:3, 3] + linear @ caster.center - points
+    along, square = dot(middle, directions), dot(middle, middle)
+    near = np.flatnonzero((square - along**2 <= reach) & ((along > 0.0) | (square <= reach)))
+    into = np.linalg.inv(linear)
+    origins, local_directions = (points[near] - body.matrix[:3, 3]) @ into.T, directions[near] @ into.T
+    places, towards = (origins - caster.center) / caster.radius, unit(local_directions)
+    of, face = caster.candidates(places, towards, np.full(len(near), MOST_FACES), np.ones(len(mesh.faces), dtype=bool))
     first, second, third = (mesh.vertices[mesh.faces[face, corner]] for corner in range(3))
     normal = np.cross(second - first, third - first)
-    slope = dot(local_directions[line], normal)
-    reached = dot(first - origins[line], normal) / np.where(slope == 0.0, np.inf, slope)
+    slope = dot(local_directions[of], normal)
+    reached = dot(first - origins[of], normal) / np.where(slope == 0.0, np.inf, slope)
     ahead = reached > 0.0
     # Inside a body as often as faces ahead are exits, less entries; each that is passed changes that.
     sign = np.sign(slope)[ahead] * (-1.0 if mesh.diagnosis.inverted else 1.0)
-    return line[ahead], reached[ahead], sign
+    return near[of[ahead]], reached[ahead], sign
 
 
 #: Directions in which each sample looks for the environment and for other parts of the body.

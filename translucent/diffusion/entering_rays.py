@@ -51,6 +51,31 @@ def joined_rays(rays: Sequence[EnteringRays], *, from_one: bool = False) -> Ente
     return EnteringRays(samples, directions, entering, mirrored, from_one)
 
 
+def two_of_many(rays: EnteringRays, normals: Array) -> EnteringRays:
+    """Two rays at each sample in place of all rays of one light there, at samples with normals (s, 3).
+
+    Their flux, mean direction along the surface, and the mean and variance of the cosine with the normal, on which
+    first events depend, are those of all: a quadrature with two nodes.
+    """
+    flux, own = rays.entering.sum(axis=1, keepdims=True), normals[rays.samples]
+    cosine = -(rays.directions * own).sum(axis=1, keepdims=True)
+    columns = np.concatenate([flux, flux * cosine, flux * cosine**2, flux * rays.directions], axis=1)
+    columns = np.concatenate([columns, rays.entering, rays.mirrored], axis=1)
+    sums = np.stack([np.bincount(rays.samples, column, len(normals)) for column in columns.T], axis=1)
+    samples = np.flatnonzero(sums[:, 0])
+    total, first, second, along, entering, mirrored = np.split(sums[samples], (1, 2, 3, 6, 9), axis=1)
+    mean, own = first / total, normals[samples]
+    deviation = np.sqrt(np.maximum(second / total - mean**2, 0.0))
+    level = _across(along, own)
+    level /= np.maximum(np.linalg.norm(level, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    parts = []
+    for node in (mean - deviation, mean + deviation):
+        node = np.clip(node, 0.0, 1.0)
+        directions = np.sqrt(1.0 - node**2) * level - node * own
+        parts.append(EnteringRays(samples, directions, 0.5 * entering, 0.5 * mirrored))
+    return joined_rays(parts, from_one=rays.from_one)
+
+
 @dataclass(frozen=True, eq=False)
 class LateralShift:
     """Shift of the first events of one light along the surface, from where its rays enter to where they are scattered.

@@ -22,7 +22,7 @@ from translucent.diffusion.entering import (
     sky_light,
     suns_of,
 )
-from translucent.diffusion.entering_rays import EnteringRays, joined_rays
+from translucent.diffusion.entering_rays import EnteringRays, joined_rays, two_of_many
 from translucent.diffusion.environment_ahead import EnvironmentAhead
 from translucent.diffusion.exchange import Patches, direct_irradiance
 from translucent.diffusion.grid import BodyGrid
@@ -336,7 +336,8 @@ class DiffusingBody:
         def rays_of(lights: Sequence[Light], stops: RayCaster | None) -> tuple[Array, EnteringRays]:
             casters, ior, interface = self.lit.casters, self._medium.ior, self._interface
             found = [from_light(grid, casters, light, ior, interface, dimming, stops) for light in lights]
-            return np.zeros((0, 3)), joined_rays(found, from_one=True)
+            together = joined_rays(found, from_one=True)
+            return np.zeros((0, 3)), two_of_many(together, grid.face_normals) if len(lights) > 2 else together
 
         arriving, most = self.lit.arriving, 1 + len(scene.lights) + len(suns)
         entering, bright = kept(arriving, (environment_key(scene.environment), through), sky, most)
