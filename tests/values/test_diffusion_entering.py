@@ -208,23 +208,28 @@ def test_bright_parts_of_the_environment_enter_as_lamps_do(monkeypatch: pytest.M
 
 
 def test_constant_environments_have_no_rays_and_others_keep_their_flux() -> None:
-    """The least radiance of all directions enters as uniform light; the rest enters by direction; flux is conserved."""
-    medium = tl.Medium(scattering=3.0, ior=1.3)
-    body = tl.Object(BALL, medium)
+    """The least radiance of all directions enters as uniform light; the rest as two rays at each sample.
+
+    Flux, and the sums of it times the cosine and its square, are those of all directions.
+    """
+    body = tl.Object(BALL, medium := tl.Medium(scattering=3.0))
     geometry = lit_body(body, None, Diffusion(12).cell_size(body))
-    solver, found = DiffusingBody(geometry, medium, 0.0), {}
+    solver, found, sky = DiffusingBody(geometry, medium, 0.0), {}, geometry.shape.sky
+    received, normals = geometry.entrance(1.0, 0.0).received, geometry.grid.normals
     for top in (1.0, 3.0):
-        parts = environment_parts(tl.Environment.gradient((1, 1, 1), (top, top, 1)), geometry.shape.sky.directions)
+        parts = environment_parts(tl.Environment.gradient((1, 1, 1), (top, top, 1)), sky.directions)
         found[top] = uniform, rays = solver._from_sky(parts, [])
-        sums = uniform.copy()
-        np.add.at(sums, rays.samples, rays.entering)
-        means = parts / nearest_parts(geometry.shape.sky.directions)[1][:, None]
-        received = geometry.entrance(1.3, 0.0).received[:, None] * means[geometry.shape.sky.direction]
-        expected = [np.bincount(geometry.shape.sky.sample, channel) for channel in received.T]
-        np.testing.assert_allclose(sums, np.transpose(expected), rtol=1e-9)
+        means = parts / nearest_parts(sky.directions)[1][:, None]
+        for power in (0, 1, 2):
+            every = received * np.maximum(normals @ sky.directions.T, 0.0) ** power
+            cosine = -(rays.directions * normals[rays.samples]).sum(axis=1, keepdims=True)
+            # Of the uniform part all directions count.
+            sums = uniform * (every.sum(axis=1) / received.sum(axis=1))[:, None]
+            np.add.at(sums, rays.samples, rays.entering * cosine**power)
+            np.testing.assert_allclose(sums.sum(axis=1), (every @ means).sum(axis=1), rtol=1e-4)
     assert not len(found[1.0][1].samples)
     rays = found[3.0][1]
-    assert len(rays.samples) == entering.SKY_RAYS * len(geometry.grid.points)
+    assert len(rays.samples) == 2 * len(geometry.grid.points)
     assert not rays.entering[:, 2].any()
 
 

@@ -110,7 +110,7 @@ def test_light_that_stays_arrives_as_it_did(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_points_of_a_sphere_light_enter_together(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Their light goes on along the surface in its mean direction. Measured: 2e-4 of the largest exitance at most."""
+    """Two rays at each sample stand for all. Measured: 2e-4 of the largest exitance at most."""
     body = tl.Object(Sphere().tessellate(24), MILK)
     lights = with_points([tl.SphereLight((3, 0, 1), 1.0, 0.8), tl.PointLight((0, 3, 0), 1.0)], 32)
     scene = tl.Scene([body], tl.Camera.look_at((0, 0, 5), (0, 0, 0)), lights)

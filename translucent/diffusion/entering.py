@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import combinations_with_replacement
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -13,9 +14,9 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask
-from translucent.diffusion.entering_rays import EnteringRays
+from translucent.diffusion.entering_rays import EnteringRays, joined_rays, two_directions
 from translucent.diffusion.exchange import OpaqueSurfaces
-from translucent.diffusion.grid import BodyGrid, other_plane_points
+from translucent.diffusion.grid import BodyGrid
 from translucent.diffusion.keys import may_dim
 from translucent.diffusion.photons import EnteringPhotons
 from translucent.formulas import optics
@@ -128,11 +129,11 @@ BEFORE = 1e-4
 #: counts, in such heights. The first is about a cell: the samples then find its light within a tenth (sd 3 %).
 _WIDTH, _REACH = 3.0, 3.0
 
-#: Rays of each sample that carry the light of an environment that is brighter in some directions than in others.
-SKY_RAYS = 2
-
 #: Radiance of an environment's picture, in units of its mean, above which light counts as that of a sun.
 SUN = 16.0
+
+#: Fraction of the light that may be rounding.
+_ROUNDING = 1e-6
 
 #: Pairs of a sample and a direction that are looked at at a time.
 _TOGETHER = 1 << 15
@@ -396,79 +397,48 @@ def transfer(sky: Sky, samples: int, ior: float, interface: DiffuseInterface) ->
 
 
 def sky_light(
-    sky: Sky,
-    received: Array,
-    radiances: Callable[[slice], Array],
-    normals: Array,
-    ior: float,
-    mirrored: float,
+    sky: Sky, received: Floats, means: Array, normals: Array, ior: float, mirrored: float
 ) -> tuple[Array, EnteringRays]:
-    """Light of the environment: uniform flux (s, 3) at the samples, and rays for the rest.
+    """Light of the environment: uniform flux (s, 3) at the samples, and two rays at each for the rest.
 
-    Of each sample, the least radiance in the directions above it is uniform. `SKY_RAYS` rays have the rest: each an
-    equal part of the flux, in the order of the directions, and all of it from one of them, chosen by its flux.
-    Neighboring samples have others.
+    Of each sample, the least radiance in the directions above it is uniform, and the rays are a quadrature of the rest,
+    see `two_directions`.
 
     Parameters
     ----------
     sky : Sky
-        With n pairs of a sample and a direction.
-    received : (n,) float64
-        See `Entrance`.
-    radiances : callable
-        Mean radiance (3, k) of the part of the sky around the direction of each of k pairs, as the sample sees it.
+        In k directions.
+    received : (1 or 3, s, k) float32
+        See `Entrance`, in all channels alike or in each.
+    means : (k, 3) float64
+        Mean radiance of each part.
     normals : (s, 3)
         Of the surface at the samples.
     ior : float
     mirrored : float
         Flux that the surface mirrors, as if it was diffuse, for a unit of what enters.
     """
-    entering, rays = np.zeros((len(normals), 3)), []
-    first, shifts = sky.first, other_plane_points(len(normals))[:, 0]
-    ends = np.append(first[1:], len(received))
-    for of in np.array_split(np.arange(len(first)), len(received) // _TOGETHER + 1):
-        pairs = slice(first[of[0]], ends[of[-1]]) if len(of) else slice(0, 0)
-        samples, starts = sky.sample[first[of]].astype(np.int64), first[of] - pairs.start
-        if len(of):
-            entering[samples], *found = _sky_rays(received[pairs], radiances(pairs), starts, shifts[samples])
-            rays.append((samples[found[0]], sky.direction[pairs][found[1]], found[2]))
-    of, direction, flux = (np.concatenate(part) for part in zip(*rays, strict=True))
-    towards = sky.directions[direction.ravel()]
-    samples = np.repeat(of, SKY_RAYS)
-    refracted = refracted_direction(-towards, normals[samples], np.full(len(samples), ior))
-    flux = flux.reshape(-1, 3)
-    return entering, EnteringRays(samples, refracted, flux, mirrored * flux)
-
-
-def _sky_rays(
-    received: Array, radiances: Array, first: Integers, shifts: Array
-) -> tuple[Array, Integers, Integers, Array]:
-    """Uniform flux (s, 3) of samples whose pairs begin at `first` (s,); and samples (l,) with rays, pairs and fluxes.
-
-    The pairs (l, r) are those from whose directions the rays come, for `shifts` (s,) from 0 to 1, and their fluxes are
-    (l, r, 3).
-    """
-    count, least = np.diff(first, append=len(received)), np.minimum.reduceat(radiances, first, axis=1)
-    total = np.zeros(len(received) + 1)
-    np.cumsum(received * (sum(radiances) - np.repeat(sum(least), count)), out=total[1:])
-    begin, end = first[:, None], (first + count)[:, None]
-    levels = total[begin] + (total[end] - total[begin]) * (np.arange(SKY_RAYS + 1) / SKY_RAYS)
-    chosen, between = levels[:, :-1] + shifts[:, None] * np.diff(levels), levels[:, 1:-1]
-    pairs = np.searchsorted(total, np.concatenate([chosen, between], axis=1), "right") - 1
-    pairs, cut = np.split(np.clip(pairs, begin, end - 1), [SKY_RAYS], axis=1)
-    # Sums from each pair that two rays share to the next; and the part of that pair that is the earlier ray's.
-    starts, given = np.concatenate([begin, cut], axis=1), np.empty((4, len(received)))
-    given[0] = received
-    np.multiply(received, radiances, out=given[1:])
-    sums = np.add.reduceat(given, starts.ravel(), axis=1).reshape(4, *starts.shape)
-    sums[:, np.diff(starts, append=end) == 0] = 0.0
-    uniform = sums[0].sum(axis=1)
-    part = (between - total[cut]) / np.maximum(total[cut + 1] - total[cut], 1e-300) * given[:, cut]
-    sums[:, :, :-1] += part
-    sums[:, :, 1:] -= part
-    flux = np.maximum(sums[1:] - least[..., None] * sums[0], 0.0)
-    lit = np.flatnonzero(levels[:, -1] > levels[:, 0])
-    return (least * uniform).T, lit, pairs[lit], np.moveaxis(flux, 0, -1)[lit]
+    least = means.min(axis=0)
+    means, pairs, directions = means - least, list(combinations_with_replacement(range(3), 2)), sky.directions
+    above, seen = np.zeros((len(normals), 3)), np.take(means.T.astype(np.float32), sky.direction, axis=1)
+    above[sky.sample[sky.first]] = np.minimum.reduceat(seen, sky.first, axis=1).T
+    moments = np.column_stack([directions, *(directions[:, i] * directions[:, j] for i, j in pairs)])
+    uniform, flux, sums = np.zeros((len(normals), 3)), np.zeros((len(normals), 3)), np.zeros((len(normals), 9))
+    for part, of in zip(received, np.split(np.arange(3), len(received)), strict=True):
+        total = means[:, of].sum(axis=1, keepdims=True)
+        columns = np.column_stack([means[:, of], np.ones(len(means)), total * moments, moments]).astype(np.float32)
+        found = (part @ columns).astype(np.float64)
+        own, even, light, all_around = np.split(found, np.cumsum([len(of), 1, 9]), axis=1)
+        uniform[:, of], flux[:, of] = even * (least + above)[:, of], own - even * above[:, of]
+        sums += light - above[:, of].sum(axis=1, keepdims=True) * all_around
+    flux = np.maximum(flux, 0.0)
+    samples = np.flatnonzero(flux.sum(axis=1) > _ROUNDING * uniform.sum(axis=1))
+    flux, own = flux[samples], normals[samples]
+    first, second = np.split(sums[samples] / flux.sum(axis=1, keepdims=True), [3], axis=1)
+    products = np.stack([(1 + (i != j)) * own[:, i] * own[:, j] for i, j in pairs], axis=1)
+    towards = two_directions(-first, (second * products).sum(axis=1), own)
+    refracted = [refracted_direction(each, own, np.full(len(own), ior)) for each in towards]
+    return uniform, joined_rays([EnteringRays(samples, each, 0.5 * flux, 0.5 * mirrored * flux) for each in refracted])
 
 
 def from_light(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers
 from translucent.diffusion.grid import BodyGrid
@@ -51,28 +51,47 @@ def joined_rays(rays: Sequence[EnteringRays], *, from_one: bool = False) -> Ente
     return EnteringRays(samples, directions, entering, mirrored, from_one)
 
 
-def two_of_many(rays: EnteringRays, normals: Array) -> EnteringRays:
-    """Two rays at each sample in place of all rays of one light there, at samples with normals (s, 3).
+def two_directions(mean: Array, square: Array, normals: Array) -> tuple[Array, Array]:
+    """(k, 3), (k, 3): directions of two rays of the same flux in place of many, at a surface with normals (k, 3).
 
-    Their flux, mean direction along the surface, and the mean and variance of the cosine with the normal, on which
-    first events depend, are those of all: a quadrature with two nodes.
+    First events depend on the cosine with the normal most of all: its mean and its mean square are those of all rays,
+    as of a quadrature with two nodes, and so is the mean direction along the surface. Rays from several sides are on
+    either side of that.
+
+    Parameters
+    ----------
+    mean : (k, 3) float64
+        Mean direction of all rays.
+    square : (k,) float64
+        Mean square of their cosine.
+    normals : (k, 3) float64
     """
-    flux, own = rays.entering.sum(axis=1, keepdims=True), normals[rays.samples]
-    cosine = -(rays.directions * own).sum(axis=1, keepdims=True)
-    columns = np.concatenate([flux, flux * cosine, flux * cosine**2, flux * rays.directions], axis=1)
-    columns = np.concatenate([columns, rays.entering, rays.mirrored], axis=1)
-    sums = np.stack([np.bincount(rays.samples, column, len(normals)) for column in columns.T], axis=1)
-    samples = np.flatnonzero(sums[:, 0])
-    total, first, second, along, entering, mirrored = np.split(sums[samples], (1, 2, 3, 6, 9), axis=1)
-    mean, own = first / total, normals[samples]
-    deviation = np.sqrt(np.maximum(second / total - mean**2, 0.0))
-    level = _across(along, own)
-    level /= np.maximum(np.linalg.norm(level, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-    parts = []
-    for node in (mean - deviation, mean + deviation):
-        node = np.clip(node, 0.0, 1.0)
-        directions = np.sqrt(1.0 - node**2) * level - node * own
-        parts.append(EnteringRays(samples, directions, 0.5 * entering, 0.5 * mirrored))
+    tiny = np.finfo(np.float64).tiny
+    cosine = -(mean * normals).sum(axis=1)
+    deviation = np.sqrt(np.maximum(square - cosine**2, 0.0))
+    nodes = np.clip([cosine - deviation, cosine + deviation], 0.0, 1.0)[..., None]
+    aside, level = np.sqrt(1.0 - nodes**2), _across(mean, normals)
+    length = np.linalg.norm(level, axis=1, keepdims=True)
+    along = level / np.maximum(length, tiny)
+    part = length / np.maximum(np.maximum(aside.mean(axis=0), length), tiny)
+    across = np.sqrt(1.0 - part**2) * np.cross(normals, along)
+    # What is left of it in the mean of both, which are not equally steep, is left at neighbors the other way.
+    across[::2] *= -1.0
+    flat, steep = (aside[i] * (part * along + side * across) - nodes[i] * normals for i, side in ((0, 1.0), (1, -1.0)))
+    return flat, steep
+
+
+def two_of_many(rays: EnteringRays, normals: Array) -> EnteringRays:
+    """Two rays at each sample in place of all rays of one light there; normals (s, 3). See `two_directions`."""
+    flux = rays.entering.sum(axis=1, keepdims=True)
+    cosine = (rays.directions * normals[rays.samples]).sum(axis=1, keepdims=True)
+    columns = np.concatenate([flux, flux * cosine**2, flux * rays.directions, rays.entering, rays.mirrored], axis=1)
+    sums = [np.bincount(rays.samples, column, len(normals)) for column in columns.T]
+    samples = np.flatnonzero(sums[0])
+    found = np.asarray(np.stack(sums, axis=1)[samples], np.float64)
+    mean, square = found[:, 2:5] / found[:, :1], found[:, 1] / found[:, 0]
+    entering, mirrored = 0.5 * found[:, 5:8], 0.5 * found[:, 8:]
+    parts = [EnteringRays(samples, to, entering, mirrored) for to in two_directions(mean, square, normals[samples])]
     return joined_rays(parts, from_one=rays.from_one)
 
 
@@ -100,13 +119,16 @@ class LateralShift:
 
     @classmethod
     def of(cls, grid: BodyGrid, ray: EnteringRays, ior: float) -> LateralShift:
-        """Shift of the rays of one light."""
+        """Shift of the rays of one light, which enter a body of one index; it stays if another medium comes in."""
+        if (known := _shifts.get(ray)) is not None:
+            return known
         spacing = np.sqrt(grid.area)
         along = _across(ray.directions, grid.face_normals[ray.samples])
         level = np.linalg.norm(along, axis=1)
         matched = ior == 1.0
         chord = grid.chords(ray.samples, ray.directions) if matched else np.full(len(level), np.inf)
-        return cls(_step(grid, ray.samples, along), level / spacing, chord)
+        found = _shifts[ray] = cls(_step(grid, ray.samples, along), level / spacing, chord)
+        return found
 
     def moved(self, values: Sequence[Array], samples: Integers) -> Array:
         """(n, s): values of n quantities (`MOST_SHIFTED` + 1, k), shifted by each number of steps, at samples (k,)."""
@@ -115,6 +137,10 @@ class LateralShift:
             own = np.stack([np.bincount(samples, value[number], count) for value in values], axis=1)
             total = self.step @ total + own if number < MOST_SHIFTED else own
         return total.T
+
+
+#: Shifts of rays that are in use.
+_shifts: WeakKeyDictionary[EnteringRays, LateralShift] = WeakKeyDictionary()
 
 
 def shifted_fractions(places: Floats, *weights: Floats) -> list[Floats]:
@@ -146,21 +172,19 @@ def _step(grid: BodyGrid, samples: Integers, along: Array) -> sparse.csr_array:
     """(s, s): map of a flux at the samples to the flux one distance between samples further along the rays.
 
     Rays at samples (k,) go `along` the surface (k, 3), several at one sample on average; samples without a ray take the
-    direction of the nearest one. Each sample interpolates the flux that far back. Rays that spread along the surface
+    direction of neighbors. Each sample interpolates the flux that far back. Rays that spread along the surface
     bring less.
     """
     count, spacing = len(grid.points), float(np.sqrt(grid.area))
     along = np.stack([np.bincount(samples, part, count) for part in along.T], axis=1)
-    samples = np.flatnonzero(np.bincount(samples, minlength=count))
-    along = along[samples]
-    reach = (MOST_SHIFTED + 1) * spacing
-    nearest = np.full(count, len(samples))
-    nearest[samples] = np.arange(len(samples))
-    others = np.flatnonzero(nearest == len(samples))
-    nearest[others] = cKDTree(grid.points[samples]).query(grid.points[others], distance_upper_bound=reach)[1]
-    receivers = np.flatnonzero(nearest < len(samples))
+    of = np.where(np.bincount(samples, minlength=count) > 0, np.arange(count), -1)
+    for _ in range(MOST_SHIFTED + 1):
+        without = np.flatnonzero(of < 0)
+        beside = of[grid.nearest[without]]
+        of[without] = beside[np.arange(len(without)), (beside >= 0).argmax(axis=1)]
+    receivers = np.flatnonzero(of >= 0)
     normals, travel = grid.face_normals[receivers], np.zeros((count, 3))
-    towards = _across(along[nearest[receivers]], normals)
+    towards = _across(along[of[receivers]], normals)
     towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), np.finfo(np.float64).tiny)
     travel[receivers] = towards
     around = min(INTERPOLATED, count)

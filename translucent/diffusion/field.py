@@ -392,20 +392,19 @@ class DiffusingBody:
         """
         if not parts.any():
             return np.zeros((len(self.lit.grid.points), 3)), joined_rays([])
-        sky, ior = self.lit.shape.sky, self._medium.ior
-        means = (parts / nearest_parts(sky.directions)[1][:, None]).T
+        sky, ior, received = self.lit.shape.sky, self._medium.ior, self._entrance.received[None]
+        means = parts / nearest_parts(sky.directions)[1][:, None]
         absorbing = [body for body in others if body.medium is not None and np.any(body.medium.absorption)]
-        depth = np.zeros((3, len(sky.sample) if absorbing else 0))
+        if absorbing:
+            received = np.repeat(received, 3, axis=0)
         for body, paths in zip(absorbing, self.lit.sky_paths(absorbing), strict=True):
             assert body.medium is not None
-            depth += np.asarray(body.medium.absorption)[:, None] * paths.toarray()[sky.sample, sky.direction]
-
-        def radiances(pairs: slice) -> Array:
-            seen = np.take(means, sky.direction[pairs], axis=1)
-            return seen * optics.transmittance(depth[:, pairs]) if absorbing else seen
-
+            sample, direction = paths.nonzero()
+            received[:, sample, direction] *= optics.transmittance(
+                np.multiply.outer(body.medium.absorption, paths.data)
+            )
         mirrored = (1.0 - diffuse_interface(ior).entering) / self._interface.entering
-        return sky_light(sky, self._entrance.received, radiances, self.lit.grid.normals, ior, mirrored)
+        return sky_light(sky, received, means, self.lit.grid.normals, ior, mirrored)
 
 
 def _cell_at(grid: BodyGrid, pose: Pose, position: npt.ArrayLike) -> int:

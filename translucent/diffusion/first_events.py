@@ -365,15 +365,20 @@ class FirstEvents:
         # Small bodies are curved, and reflect more than half-spaces.
         self._flat = float(optics.opacity((self._extinction * chord / FLAT) ** 3))
 
+    def _reflectances(self, cosines: Array | None) -> tuple[Array | float, Array | float]:
+        """Fraction of events that are `straight_back`, and the excess of diffusion over the exact half-space."""
+        straight = straight_back(self._albedo, self._ior, self._phase, cosines) * self._thick
+        excess = self._flat * half_space_excess(self._albedo, self._ior, cosines)
+        return straight, excess / diffuse_interface(self._ior).conductance
+
+    @cached_property
+    def _at_cosines(self) -> tuple[Array | float, Array | float]:
+        return self._reflectances(_COSINES)
+
     def of(self, paths: EntryPaths) -> Events:
         """First events of light along these paths."""
         grid, layer, extinction, cosine = self._grid, self._layer, self._extinction, paths.cosine
-        cosines = None if paths.diffuse else _COSINES
-        straight = paths.at_cosine(straight_back(self._albedo, self._ior, self._phase, cosines) * self._thick)
-        # Excess of the reflectance by diffusion over that of the exact half-space.
-        excess = paths.at_cosine(
-            self._flat * half_space_excess(self._albedo, self._ior, cosines) / diffuse_interface(self._ior).conductance
-        )
+        straight, excess = map(paths.at_cosine, self._reflectances(None) if paths.diffuse else self._at_cosines)
         rate = np.broadcast_to(extinction / np.asarray(cosine), paths.samples.shape)
         near, above = layer.events(paths.samples, rate)
         if np.any(straight):

@@ -55,14 +55,14 @@ class Entrance:
     ----------
     transfer : (n,) float64
         Flux for a unit of radiance from the part of the sphere around the direction of each pair of `Sky`.
-    received : (n,) float64
-        The same where the sky is visible, else 0.
+    received : (s, k) float32
+        The same for each sample and each direction of `Sky` where the sky is visible, else 0.
     itself : (s, s) csr_array
         Form factors: for a unit of diffuse flux that leaves another sample.
     """
 
     transfer: Array
-    received: Array
+    received: Floats
     itself: sparse.csr_array
 
 
@@ -119,7 +119,8 @@ class BodyShape:
         if (ior, roughness) not in self._entrances:
             sky, count = self.sky, len(self.grid.points)
             flux = transfer(sky, count, ior, diffuse_interface(ior, roughness))
-            received = np.where(np.isinf(sky.distance), flux, 0.0)
+            received, free = np.zeros((count, len(sky.directions)), np.float32), np.isinf(sky.distance)
+            received[sky.sample[free], sky.direction[free]] = flux[free]
             ends = np.searchsorted(sky.sample[sky.facing], np.arange(count + 1))
             itself = sparse.csr_array((flux[sky.facing] / np.pi, sky.other, ends), (count, count))
             self._entrances.clear()
@@ -296,7 +297,8 @@ class LitBody:
             return free
         if (ior, roughness) not in self._entrances:
             sky, itself, other = self.shape.sky, free.itself.copy(), np.zeros(len(hidden), bool)
-            received = np.where(hidden, 0.0, free.received)
+            received = free.received.copy()
+            received[sky.sample[hidden], sky.direction[hidden]] = 0.0
             other[seen] = True
             itself.data[(hidden | other)[sky.facing]] = 0.0
             self._entrances.clear()
