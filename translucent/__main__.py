@@ -12,6 +12,8 @@ def main() -> int:
     if heeds:
         # Nothing has begun. An exception would be lost where Python imports by callbacks.
         signal.signal(signal.SIGINT, _leave)
+    # Matrices are small here, or many are multiplied at once: more threads of a BLAS would wait in busy loops.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from translucent.cli import main
 
     if heeds:

@@ -19,8 +19,6 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
-from importlib import metadata
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -100,6 +98,8 @@ def _load_from_wheel() -> ctypes.CDLL | None:
     The wheel carries the libraries that it needs under names that the loader finds only among those already loaded,
     so they are loaded over and over until none is left that could not be.
     """
+    from importlib import metadata  # late: it takes milliseconds, and most contexts are others
+
     try:
         files = metadata.distribution(WHEEL).files or []
     except metadata.PackageNotFoundError:
@@ -217,9 +217,6 @@ def _allocate_cache(folder: Path) -> None:
 
 Backend = Literal["egl", "window", "osmesa"]
 
-#: Version of moderngl. Looking it up takes a millisecond, and every frame records it.
-MODERNGL = version("moderngl")
-
 #: OpenGL version code that every raster path needs: 3.3 core.
 REQUIRED = 330
 
@@ -305,7 +302,7 @@ class GpuContext:
             "backend": self.backend,
             "renderer": self.renderer,
             "driver": str(self.info["GL_VERSION"]),
-            "moderngl": MODERNGL,
+            "moderngl": moderngl.__version__,
         }
 
     def current(self) -> AbstractContextManager[moderngl.Context]:

@@ -169,6 +169,11 @@ def _usable(given: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float32], list[str]
     for rows in row_blocks(*given.shape[:2]):
         with np.errstate(invalid="ignore"):  # of signaling NaNs
             values = given[rows].astype(np.float64)
+            least, most = values.min(), values.max()
+        if least >= 0.0 and most <= MAX_RADIANCE:  # of NaN neither is true
+            with np.errstate(under="ignore"):
+                pixels[rows], any_right = values, True
+            continue
         unknown = ~np.isfinite(values)
         negative, high = (values < 0) & ~unknown, (values > MAX_RADIANCE) & ~unknown
         wrong = unknown | negative
@@ -196,6 +201,9 @@ IRRADIANCE_SIZE = (64, 128)
 #: Rounds of `_balanced`: each halves the imbalance.
 BALANCING_ROUNDS = 50
 
+#: Pairs of rows that are transformed at a time.
+_PAIRS = 128
+
 #: Number of pictures whose blurred versions are cached.
 KEPT = 8
 
@@ -221,45 +229,58 @@ def sized(source: EnvironmentMap, size: tuple[int, int]) -> Array:
 
 
 def convolved(pixels: Array, lobe: Callable[[Array], Array]) -> Array:
-    """(h, w, 3): mean of the pixels around each, weighted by a lobe, a function of the cosine of the angle."""
-    height, width = pixels.shape[:2]
-    spectrum = _spectrum(height, width, lobe)
-    solid_angles = row_solid_angles(height, width)
-    balance = _balanced(spectrum[..., 0] * solid_angles)
-    spectrum *= (balance[:, None] * balance * solid_angles)[..., None]
-    # The spectrum is real: real and imaginary parts of the picture's are columns of their own.
-    transformed = np.ascontiguousarray(np.fft.rfft(pixels, axis=1)).view(np.float64)
-    blurred = np.ascontiguousarray(np.einsum("ijf,jfc->ifc", spectrum, transformed, optimize=True)).view(np.complex128)
-    return np.ascontiguousarray(np.maximum(np.fft.irfft(blurred, n=width, axis=1), 0.0))
+    """(h, w, 3): mean of the pixels around each, weighted by a lobe, a function of the cosine of the angle; h is even.
 
-
-def _spectrum(height: int, width: int, lobe: Callable[[Array], Array]) -> Array:
-    """(height, height, width / 2 + 1): Fourier transforms in longitude of a lobe, for pairs of rows.
-
-    They are the same for two rows in turn and for their mirror images in the equator, so a quarter of them is made.
+    What a picture has in common with its mirror image in the equator, and what it has not, are blurred apart.
     """
-    first, second, cosines = _cosines_between(height, width)
-    weights = lobe(cosines)
-    # A lobe is even in longitude: its transform is real.
-    found = np.fft.rfft(np.concatenate([weights, weights[:, -2:0:-1]], axis=1), axis=1).real
-    spectrum = np.empty((height, height, width // 2 + 1))
-    for i, j in ((first, second), (height - 1 - first, height - 1 - second)):
-        spectrum[i, j] = spectrum[j, i] = found
-    return spectrum
+    height, width = pixels.shape[:2]
+    half = height // 2
+    near, far = _spectra(height, width, lobe)
+    solid_angles = row_solid_angles(height, width)[:half]
+    balance = _balanced((near[0] + far[0]) * solid_angles)
+    scale = 0.5 * balance[:, None] * balance * solid_angles
+    # The spectra are real: real and imaginary parts of the picture's are columns of their own.
+    transformed = np.ascontiguousarray(np.fft.rfft(pixels, axis=1)).view(np.float64).swapaxes(0, 1)
+    upper, lower = transformed[:, :half], transformed[:, : half - 1 : -1]
+    even = ((near + far) * scale) @ (upper + lower)
+    odd = ((near - far) * scale) @ (upper - lower)
+    blurred = np.concatenate([even + odd, (even - odd)[:, ::-1]], axis=1).swapaxes(0, 1)
+    found = np.fft.irfft(np.ascontiguousarray(blurred).view(np.complex128), n=width, axis=1)
+    return np.ascontiguousarray(np.maximum(found, 0.0))
+
+
+def _spectra(height: int, width: int, lobe: Callable[[Array], Array]) -> tuple[Array, Array]:
+    """(width / 2 + 1, height / 2, height / 2) each: Fourier transforms in longitude of a lobe, for pairs of upper rows,
+    and of an upper row and the mirror image of one in the equator.
+
+    They are the same for two rows in turn and for their mirror images, so a quarter of all pairs is made.
+    """
+    cosines, near, far = _cosines_between(height, width)
+    found = np.empty((width // 2 + 1, len(cosines)))
+    for begin in range(0, len(cosines), _PAIRS):  # that stay in a cache
+        weights = lobe(cosines[begin : begin + _PAIRS])
+        # A lobe is even in longitude: its transform is real.
+        both = np.concatenate([weights, weights[:, -2:0:-1]], axis=1)
+        found[:, begin : begin + _PAIRS] = np.fft.rfft(both, axis=1).real.T
+    return found.take(near, axis=1), found.take(far, axis=1)
 
 
 @lru_cache(maxsize=2)
-def _cosines_between(height: int, width: int) -> tuple[Integers, Integers, Array]:
-    """Pairs of rows (n,), (n,), a quarter of all, and (n, width / 2 + 1): cosine of the angle from a pixel of the first
-    row to one of the second and some columns on.
+def _cosines_between(height: int, width: int) -> tuple[Array, Integers, Integers]:
+    """Cosines (n, width / 2 + 1) of the angles from a pixel of one row to those of another and some columns on, for a
+    quarter of all pairs of rows, and the numbers (height / 2, height / 2) of these pairs: of two upper rows, and of one
+    and the mirror image of another in the equator.
     """
-    upper = np.tri(height, dtype=bool)
-    first, second = np.nonzero(upper.T & upper[::-1])  # i <= j, and i + j < height
+    half = height // 2
+    first, second = np.triu_indices(half)
+    pairs = np.concatenate([[first, second], [first, height - 1 - second]], axis=1)
+    near, far = np.zeros((2, half, half), np.intp)
+    near[first, second] = near[second, first] = np.arange(len(first))
+    far[:] = near + len(first)
     theta = np.pi * (np.arange(height) + 0.5) / height
     across = np.cos(2.0 * np.pi * np.arange(width // 2 + 1) / width)
-    cosine, sine = np.cos(theta), np.sin(theta)
-    around = (sine[first] * sine[second])[:, None] * across
-    return first, second, (cosine[first] * cosine[second])[:, None] + around
+    (cosine, other), (sine, other_sine) = np.cos(theta)[pairs], np.sin(theta)[pairs]
+    return (cosine * other)[:, None] + (sine * other_sine)[:, None] * across, near, far
 
 
 def _balanced(weights: Array) -> Array:
