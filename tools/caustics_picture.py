@@ -1,9 +1,6 @@
-"""Picture of caustics in media of docs/measurements/shadows.md: ``python tools/caustics_picture.py [OUT.png]``."""
+"""Picture of caustics in media of docs/measurements/shadows.md; `tools/gallery.py` draws it."""
 
 from __future__ import annotations
-
-import sys
-from pathlib import Path
 
 import numpy as np
 from PIL import Image
@@ -13,7 +10,7 @@ from translucent.bench.caustics import GLASS
 from translucent.geometry.solids import Box
 
 
-def main(path: Path = Path("docs/caustics-in-media.png")) -> None:
+def main() -> None:
     """Draw a ball in fog and a ball over wax, side by side."""
     smoke = tl.Object(Box((-3.2, -4.0, -1.6), (3.2, 2.4, 1.6)).tessellate(), tl.Medium(0.02, 0.16))
     block = tl.Object(
@@ -39,8 +36,8 @@ def main(path: Path = Path("docs/caustics-in-media.png")) -> None:
             renderer.render(one, (360, 360), samples=4, scattering=tl.Diffusion(96), caustics=tl.Caustics(1_000_000))
             for one in scenes
         ]
-    Image.fromarray(np.hstack([frame.to_srgb8() for frame in shown])).save(path)
+    Image.fromarray(np.hstack([frame.to_srgb8() for frame in shown])).save("docs/caustics-in-media.png")
 
 
 if __name__ == "__main__":
-    main(*map(Path, sys.argv[1:]))
+    main()

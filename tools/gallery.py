@@ -1,6 +1,7 @@
-"""
-Make the pictures of docs/gallery/ and their overview from the examples, and those of docs/pictures/ from the commands
-that the pages show: ``python tools/gallery.py [NAME...]``.
+"""Make the pictures of docs: ``python tools/gallery.py [NAME...]``.
+
+Those of docs/gallery/ and their overview come from the examples, those of docs/pictures/ from the commands that the
+pages show, and docs/caustics-in-media.png from tools/caustics_picture.py.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ FOLDER = ROOT / "docs" / "gallery"
 #: Those of the overview, row by row.
 OVERVIEW = ("wine", "jade", "soap", "bears", "amber", "candle")
 TILE = (320, 240)
+
+CAUSTICS = "caustics_in_media"
 
 #: A picture of docs/pictures/ that a page shows.
 SHOWN = re.compile(r"\((?:\.\./)?pictures/(\w+)\.jpg\)")
@@ -66,14 +69,17 @@ def draw(name: str, command: str) -> None:
 
 
 @click.command(help=__doc__)
-@click.argument("names", nargs=-1, type=click.Choice((*OVERVIEW, "bubble", *pages())))
+@click.argument("names", nargs=-1, type=click.Choice((*OVERVIEW, "bubble", CAUSTICS, *pages())))
 def main(names: tuple[str, ...]) -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
     shown = pages()
-    for name in names or (*OVERVIEW, *shown):
+    for name in names or (*OVERVIEW, CAUSTICS, *shown):
         print(f"{name}: ", end="", flush=True)
         if name in shown:
             draw(name, shown[name])
+        elif name == CAUSTICS:
+            os.chdir(ROOT)
+            runpy.run_path(str(ROOT / "tools" / "caustics_picture.py"), run_name="__main__")
         else:
             os.chdir(FOLDER)
             runpy.run_path(str(ROOT / "examples" / f"{name}.py"))

@@ -170,7 +170,9 @@ def main(output: Path, keep: bool, software: bool, only: str | None) -> None:
     def preview() -> str:
         if "DISPLAY" not in os.environ:
             return "left out: there is no display"
-        return run(["tools/preview_speed.py", "4"], output / "preview.txt")
+        return run(
+            ["tools/compare_checkouts.py", "--scene", "orbit", "--clock", "--pairs", "1"], output / "preview.txt"
+        )
 
     # What is lost least if the time on a borrowed machine ends comes last.
     steps: dict[str, Callable[[], str]] = {"frames": frames, "report": report, "tests": tests, "preview": preview}
