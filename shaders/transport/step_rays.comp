@@ -19,7 +19,7 @@ layout(local_size_x = COMPUTE_GROUP) in;
 layout(std430, binding = END_COUNTS_BINDING) writeonly buffer EndCounts { uint end_counts[]; };
 #endif
 
-layout(std430, binding = LIVE_RAYS_BINDING) readonly buffer LiveRays { int live_rays[]; };   // rows: number, place, pixel; path, object, triangle, weights of the hit
+layout(std430, binding = LIVE_RAYS_BINDING) readonly buffer LiveRays { int live_rays[]; };   // rows: numbers, hits first; by number: place, pixel; path, object, triangle, weights of the hit
 layout(std430, binding = RAY_LIGHT_BINDING) writeonly buffer RayLight { vec4 ray_light[]; };  // and fraction that is lost
 
 uniform int first_number, live_count;
@@ -30,15 +30,15 @@ void main() {
     if (at >= live_count) { return; }
     read_bodies();
     int number = live_rays[at];
-    Ray ray = stored_ray(live_rays[live_rows + at]);
-    uint word = uint(live_rays[2 * live_rows + at]);
+    Ray ray = stored_ray(live_rays[live_rows + number]);
+    uint word = uint(live_rays[2 * live_rows + number]);
     int channel = channel_of(word);
 #if MISSES
     leave(ray, Hit(NOTHING, -1, -1, vec2(0.0)));
     traced_radiance += first_throughput * radiance_beyond(first_end);
 #else
-    Hit hit = Hit(intBitsToFloat(live_rays[3 * live_rows + at]), live_rays[4 * live_rows + at], live_rays[5 * live_rows + at],
-        intBitsToFloat(ivec2(live_rays[6 * live_rows + at], live_rays[7 * live_rows + at])));
+    Hit hit = Hit(intBitsToFloat(live_rays[3 * live_rows + number]), live_rays[4 * live_rows + number], live_rays[5 * live_rows + number],
+        intBitsToFloat(ivec2(live_rays[6 * live_rows + number], live_rays[7 * live_rows + number])));
     PrimaryHit primary = PrimaryHit(AIR, vec3(0.0), vec3(0.0), 0.0, 0.0, vec3(0.0), 0.0, uvec2(0u));
     primary.pixel = pixel_number(pixel_of(word));
     // Loops in place of branches: processors that draw compute both sides of a branch for all rays, and leave a loop that none needs.

@@ -89,21 +89,31 @@ class _EmbreePart:
             # From the middle before anything is multiplied: near a tiny body far from the center little is rounded.
             local, along = self._turned(origins - self.middle), self._turned(directions)
             local *= self.scale
-            ahead: Floats | float = 0.0
-            far = np.flatnonzero(np.einsum("ij,ij->i", local, local) > FAR_AWAY**2)
-            if far.size:
-                ahead = np.zeros(len(local), np.float32)
-                speed = np.einsum("ij,ij->i", along[far], along[far])
-                nearest = -np.einsum("ij,ij->i", local[far], along[far]) / speed
-                ahead[far] = np.maximum(nearest - FAR_AWAY / np.sqrt(speed), 0.0)
-                local[far] += ahead[far, None] * along[far]
-            end = None if reach is None else reach * self.scale - ahead
+            ahead: Floats | None = None
+            if not max(local.max(initial=0.0), -local.min(initial=0.0)) <= FAR_AWAY / np.sqrt(3.0):  # or NaN
+                ahead = self._starts_ahead(local, along)
+            end = None if reach is None else reach * self.scale
+            if end is not None and ahead is not None:
+                end -= ahead
             found = self.scene.run(local, along, end, output=True)
-            missed = found["primID"] < 0
-            path = (found["tfar"] + ahead) / self.scale
-        path[missed] = _NOTHING
-        objects = np.where(missed, np.int32(-1), self.objects.take(found["geomID"], mode="clip"))
+            path, missed = found["tfar"], found["primID"] < 0
+            if ahead is not None:
+                path += ahead
+            path /= self.scale
+        np.copyto(path, _NOTHING, where=missed)
+        objects = self.objects[0] if len(self.objects) == 1 else self.objects.take(found["geomID"], mode="clip")
+        objects = np.where(missed, np.int32(-1), objects)
         return RayHits(path, objects, found["primID"], np.stack([found["u"], found["v"]]))
+
+    def _starts_ahead(self, local: Floats, along: Floats) -> Floats:
+        """Let rays (n, 3) that start far away start near the part; returns (n,): how far ahead, in its coordinates."""
+        ahead = np.zeros(len(local), np.float32)
+        far = np.flatnonzero(np.einsum("ij,ij->i", local, local) > FAR_AWAY**2)
+        speed = np.einsum("ij,ij->i", along[far], along[far])
+        nearest = -np.einsum("ij,ij->i", local[far], along[far]) / speed
+        ahead[far] = np.maximum(nearest - FAR_AWAY / np.sqrt(speed), 0.0)
+        local[far] += ahead[far, None] * along[far]
+        return ahead
 
     def _turned(self, vectors: Floats) -> Floats:
         """Vectors (n, 3) in the axes of the part. Threads of BLAS would wait for more in a busy loop."""

@@ -268,9 +268,10 @@ class _Room:
         """List the first rays with a hit that end on opaque objects; returns their number."""
         counts = np.frombuffer(self._end_counts.read(4 * max(found, 1)), np.uint32)[:found]
         at = np.flatnonzero(counts)
-        numbers, words = self._numbers
-        channels = words.take(at).view(np.uint32) >> np.uint32(30)
-        self._ended.write(np.stack([2 * at, counts.take(at), numbers.take(at), channels], axis=1).astype(np.uint32))
+        order, words = self._numbers
+        numbers = order.take(at)
+        channels = words.take(numbers).view(np.uint32) >> np.uint32(30)
+        self._ended.write(np.stack([2 * at, counts.take(at), numbers, channels], axis=1).astype(np.uint32))
         self._ended.bind_to_storage_buffer(STORAGE_BINDINGS["ended_rays"])
         return len(at)
 
@@ -289,7 +290,7 @@ class _Room:
         return _Live(found, words.take(found), ends[:, :3], ends[:, 4:7])
 
     def put(self, live: _Live, hits: RayHits) -> tuple[int, int]:
-        """Write what rays hit, rays with a hit first, and the lists of the rays of pixels.
+        """Write what rays hit, their numbers in an order with hits first, and the lists of the rays of pixels.
 
         Returns
         -------
@@ -298,13 +299,13 @@ class _Room:
         pixels : int
             Number of the pixels.
         """
-        found, missed = np.flatnonzero(hits.object >= 0), np.flatnonzero(hits.object < 0)
-        order = np.concatenate([found, missed])
-        rows, hit = np.empty((_ROWS, len(order)), np.int32), len(found)
-        rows[0], rows[1], rows[2] = order, live.places.take(order), live.pixels.take(order).view(np.int32)
-        rows[3, :hit], rows[4, :hit] = hits.path.take(found).view(np.int32), hits.object.take(found)
-        rows[5, :hit] = hits.triangle.take(found) + self._first_triangles.take(rows[4, :hit])
-        rows[6:, :hit] = hits.weights.take(found, axis=1).view(np.int32)
+        exists = hits.object >= 0
+        found = np.flatnonzero(exists)
+        rows = np.empty((_ROWS, len(exists)), np.int32)
+        rows[0, : len(found)], rows[0, len(found) :] = found, np.flatnonzero(~exists)
+        rows[1], rows[2], rows[3] = live.places, live.pixels.view(np.int32), hits.path.view(np.int32)
+        rows[4], rows[6:] = hits.object, hits.weights.view(np.int32)
+        np.add(hits.triangle, self._first_triangles.take(hits.object, mode="clip"), out=rows[5])
         self._live.write(rows)
         self._numbers = rows[0], rows[2]
         pixels = live.pixels & _PIXEL
