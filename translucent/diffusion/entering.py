@@ -418,8 +418,10 @@ def sky_light(
     mirrored : float
         Flux that the surface mirrors, as if it was diffuse, for a unit of what enters.
     """
-    least = means.min(axis=0)
-    means, pairs, directions = means - least, list(combinations_with_replacement(range(3), 2)), sky.directions
+    least, pairs, directions = means.min(axis=0), list(combinations_with_replacement(range(3), 2)), sky.directions
+    # In units of the brightest part, for single precision.
+    scale = max(float((means - least).max()), np.finfo(np.float64).tiny)
+    means = (means - least) / scale
     above, seen = np.zeros((len(normals), 3)), np.take(means.T.astype(np.float32), sky.direction, axis=1)
     above[sky.sample[sky.first]] = np.minimum.reduceat(seen, sky.first, axis=1).T
     moments = np.column_stack([directions, *(directions[:, i] * directions[:, j] for i, j in pairs)])
@@ -429,16 +431,17 @@ def sky_light(
         columns = np.column_stack([means[:, of], np.ones(len(means)), total * moments, moments]).astype(np.float32)
         found = (part @ columns).astype(np.float64)
         own, even, light, all_around = np.split(found, np.cumsum([len(of), 1, 9]), axis=1)
-        uniform[:, of], flux[:, of] = even * (least + above)[:, of], own - even * above[:, of]
+        uniform[:, of], flux[:, of] = even * (least + scale * above)[:, of], own - even * above[:, of]
         sums += light - above[:, of].sum(axis=1, keepdims=True) * all_around
     flux = np.maximum(flux, 0.0)
-    samples = np.flatnonzero(flux.sum(axis=1) > _ROUNDING * uniform.sum(axis=1))
-    flux, own = flux[samples], normals[samples]
-    first, second = np.split(sums[samples] / flux.sum(axis=1, keepdims=True), [3], axis=1)
+    samples = np.flatnonzero(scale * flux.sum(axis=1) > _ROUNDING * uniform.sum(axis=1))
+    own, total = normals[samples], flux[samples].sum(axis=1, keepdims=True)
+    first, second = np.split(sums[samples] / total, [3], axis=1)
     products = np.stack([(1 + (i != j)) * own[:, i] * own[:, j] for i, j in pairs], axis=1)
     towards = two_directions(-first, (second * products).sum(axis=1), own)
     refracted = [refracted_direction(each, own, np.full(len(own), ior)) for each in towards]
-    return uniform, joined_rays([EnteringRays(samples, each, 0.5 * flux, 0.5 * mirrored * flux) for each in refracted])
+    half = 0.5 * scale * flux[samples]
+    return uniform, joined_rays([EnteringRays(samples, each, half, mirrored * half) for each in refracted])
 
 
 def from_light(
