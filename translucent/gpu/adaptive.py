@@ -44,6 +44,12 @@ DIFFERENCE_TO_ERROR = 12.0**0.5
 #: pixel, as a multiple of those of the picture.
 FIRST_LOOK, MORE = 3, 2
 
+#: Samples that the variance expected from the 3 x 3 pixels counts as, and the part of it that is the variance of an
+#: edge which makes their means as uneven as they are; the rest is that of samples in them. Smooth interfaces show
+#: edges, which are in some pixels and not in those beside: few samples that agree may have missed one. The noise of
+#: rough interfaces is alike in these pixels, and a pixel that goes by its own stops where that is low by chance.
+EDGES, NOISE = {"prior": 4.0, "by_edges": 1.0 / 3.0}, {"prior": 1e6, "by_edges": 0.0}
+
 #: Standard errors by which a pixel is off each of the eight around it, at least, so that it takes all samples: few
 #: samples that agree may all have missed what is smaller than the pixel, or may all have hit it.
 APART = 2.0
@@ -82,8 +88,11 @@ class AdaptiveSampling:
     where that does not show, unless they are isolated: brighter than all eight around them, or darker, by what shows
     and by more than `APART` standard errors. A picture with the error that N samples of each pixel leave takes least
     time if a pixel has samples in proportion to sigma^(4/5), N (sum sigma^(4/5) / sum sigma^2)^(2/3) sigma^(4/5)
-    (Neyman 1934, "On the two different aspects of the representative method", for that error). Deviations are those of
-    the first samples, relative to the root of the light, between an error of the light and one of its logarithm.
+    (Neyman 1934, "On the two different aspects of the representative method", for that error). Deviations are relative
+    to the root of the light, between an error of the light and one of its logarithm. A few samples on one side of an
+    edge agree by chance. So the variance of a pixel is shrunk towards an expected one, which is that of the pixels
+    around, and in part that of an edge between them which their means show (Efron and Morris 1973, "Stein's estimation
+    rule and its competitors: an empirical Bayes approach").
 
     The first round finds for every sample which pixels show an interface, and sums up the light of all others:
     edges are as smooth as ever. The second traces rays; in each pixel, their mean replaces all of its
@@ -135,7 +144,7 @@ class AdaptiveSampling:
                 clock.left = left
             self._trace_sample(job, number, shift, run_passes, leave_out)
             clock.bent(number)
-        if samples > FIRST_LOOK and any(body.surface and body.surface.roughness > 0 for body in job.scene.bodies):
+        if samples > FIRST_LOOK and _is_rough(job):
             self._settle_isolated(job, samples, run_passes)
         job.bending = False
 
@@ -219,16 +228,23 @@ class AdaptiveSampling:
         if not job.covered:
             return 0
         covered = job.covered.flipped(job.targets.size[1]).wider(1, job.targets.size)  # of samples a pixel apart
-        marked = [(("bent", "unsettled"), ERROR, MUCH_LOST, unsettled_part(job, covered, "unsettled"))]
+        expected = NOISE if _is_rough(job) else EDGES
+        marked = [(("bent", "unsettled"), ERROR, MUCH_LOST, expected, unsettled_part(job, covered, "unsettled"))]
         if job.mirror is not None:
             part = unsettled_part(job, mirrored_part(job, job.mirror), "mirror_unsettled")
-            marked.append((("mirrored", "mirror_unsettled"), MIRROR_ERROR, MIRROR_LOST, part))
+            marked.append((("mirrored", "mirror_unsettled"), MIRROR_ERROR, MIRROR_LOST, NOISE, part))
         finer = min(16.0 / samples, 1.0)
         values = {"samples": samples, "most": _most(samples), "first": taken == 1, "apart": APART}
         values |= {"wanted": 0.0, "measures": 1}
         own = [
-            {**values, "difference": DIFFERENCE_TO_ERROR * finer * error, "error": finer * error, "much_lost": lost}
-            for _, error, lost, _ in marked
+            {
+                **values,
+                **expected,
+                "difference": DIFFERENCE_TO_ERROR * finer * error,
+                "error": finer * error,
+                "much_lost": lost,
+            }
+            for _, error, lost, expected, _ in marked
         ]
         if taken == FIRST_LOOK:
             found = []
@@ -255,6 +271,11 @@ class AdaptiveSampling:
         with self._left:
             self._unsettled.draw_part(part, program, job.targets[mask])
         return int(self._left.samples)
+
+
+def _is_rough(job: FrameJob) -> bool:
+    """True if any body has a rough interface."""
+    return any(body.surface and body.surface.roughness > 0 for body in job.scene.bodies)
 
 
 def wanted_samples(deviations: Floats, samples: int) -> float:
