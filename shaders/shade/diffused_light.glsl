@@ -60,7 +60,8 @@ vec3 subsurface_exitance(int object, vec3 point, vec3 normal, vec3 direction, fl
     // What comes through the body and goes on ahead is found by ahead_from_lights.
     vec3 once = entering.rgb * (1.0 - min(max(dot(travel, outwards), 0.0) / max(cosine, LEAST_ENTERING_COSINE), 1.0));
     if (row.turned > 0.0 && together > 0.0) {
-        // Light from several directions is scattered as by a phase function with smaller moments, which even light has none of.
+        // Light from several directions is scattered as by a phase function with smaller moments: even light, whose mean direction is
+        // 2 / 3 long, as by one without any.
         vec4 phase = row.phase * vec4(vec2(clamp(3.0 * together - 2.0, 0.0, 1.0)), 1.0, 1.0);
         vec3 scale = 1.0 / (row.albedo + (1.0 - row.albedo) * row.turned);
         vec3 back = normalize(vec3(dot(direction, row.grid_x), dot(direction, row.grid_y), dot(direction, row.grid_z)));

@@ -246,8 +246,8 @@ class DiffusionField:
             found = light(cosine[:, None])
             if travel is not None and directions is not None:
                 together = np.linalg.norm(travel, axis=1)
-                # Light from several directions is scattered as by a phase function with smaller moments, which even light
-                # has none of: its mean direction is 2 / 3 long.
+                # Light from several directions is scattered as by a phase function with smaller moments: even light,
+                # whose mean direction is 2 / 3 long, as by one without any.
                 phase = np.tile(self.phase.parameters, (len(travel), 1))
                 phase[:, :2] *= np.clip(3.0 * together - 2.0, 0.0, 1.0)[:, None]
                 scale = 1.0 / (self.albedo + (1.0 - self.albedo) * (1.0 - self.phase.mean_cosine))
