@@ -14,7 +14,8 @@ from translucent.geometry.solids import Box
 from translucent.planning import bodies
 from translucent.planning.bodies import halvings
 from translucent.planning.passes import NoteKind, PassName
-from translucent.planning.plan import plan
+from translucent.planning.plan import plan, plan_scene
+from translucent.planning.request import RenderRequest
 from translucent.scene.surface import Surface
 
 METHOD = tl.PathTraced(paths=16)
@@ -166,6 +167,21 @@ def test_embree_finds_hits_where_opengl_draws_on_processors_and_nothing_scatters
     assert plan(scene(body(MILK)), replace(METHOD, hits="embree"), software).hits == "embree"
     assert plan(scene(body(CLEAR)), replace(METHOD, hits="gl"), software).hits == "gl"
     assert clear.passes[-1].cost < plan(scene(body(CLEAR)), METHOD).passes[-1].cost
+
+
+@pytest.mark.parametrize(
+    ("asked", "hits"),
+    [
+        ({"pixels": 64 * 64}, "gl"),
+        ({"pixels": 64 * 64, "samples": 2}, "embree"),
+        ({"pixels": 0}, "embree"),
+        ({"pixels": 64 * 64, "caustics": tl.Caustics(10_000)}, "embree"),
+        ({"pixels": 64 * 64, "interfaces": tl.TracedInterfaces(hits="embree")}, "embree"),
+    ],
+)
+def test_few_samples_are_not_worth_embree_s_shaders(asked: dict[str, Any], hits: str) -> None:
+    shown = scene(body(tl.Medium(ior=1.5)), body(None, x=3), lights=[tl.DirectionalLight((0, -1, 0), 1.0)])
+    assert plan_scene(shown, RenderRequest(**asked), tl.Capabilities(software=True)).hits == hits
 
 
 def test_hits_that_are_no_choice_are_refused() -> None:

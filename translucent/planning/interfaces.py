@@ -260,7 +260,7 @@ class TracedInterfaces(InterfaceMode):
         interfaces, sees the environment.
     hits : {"embree", "gl"}, optional
         What finds the surfaces that rays hit: Embree on the processors, or shaders. None lets the planner pick: Embree
-        where OpenGL draws on the processors, too, else shaders.
+        where OpenGL draws on the processors, too, but for pictures of few samples; else shaders.
     """
 
     name: ClassVar[str] = "traced"

@@ -70,7 +70,7 @@ from translucent.planning.methods import (
     SignedDepth,
     ThinLayer,
 )
-from translucent.planning.methods.base import EMBREE_COST, HITS, chosen_hits
+from translucent.planning.methods.base import EMBREE_COST, FEW_SAMPLES, HITS, chosen_hits
 from translucent.planning.methods.path_traced import has_bases, takes_picture
 from translucent.planning.methods.ray_marched import MAX_STEPS
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
@@ -270,7 +270,14 @@ def _thickness(scene: Scene, request: RenderRequest, machine: Capabilities, *, a
     chosen, why = _method(scene, method, machine, bending, request.caustics)
     if method is None and isinstance(request.scattering, SingleScattering) and isinstance(chosen, FragmentLists):
         chosen = replace(chosen, light_points=request.scattering.points)
+    if isinstance(bending, TracedInterfaces) and bending.hits is None and _has_few_rays(request, machine):
+        bending = replace(bending, hits="gl")
     return assembled(scene, chosen, why, bending, machine, instead=instead, ambient=ambient)
+
+
+def _has_few_rays(request: RenderRequest, machine: Capabilities) -> bool:
+    """True if preparing Embree and its shaders takes longer than Embree saves in a picture."""
+    return machine.software and 0 < request.pixels * request.samples < FEW_SAMPLES and request.caustics is None
 
 
 def _method(
