@@ -169,10 +169,13 @@ vec3 through_media(inout Ray ray, int effective, Hit hit, vec3 normal) {
     traced_radiance += ray.throughput * emitted_radiance(medium.emission, medium.extinction, path);
 #endif
     vec3 passed = transmittance(medium.extinction * path);
+#if LAYERED
     if (is_layer(effective)) {
         Surface layer = surface_of(vec4(float(effective), 0.0, 1.0, 0.0));
         traced_radiance += ray.throughput * layer_exitance(layer, ray.origin, ray.outwards, path, passed);
     }
+#endif
+#if DIFFUSED
     if (effective != AIR) {
         float cosine = clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0);
         traced_radiance += ray.throughput * subsurface_exitance(effective, ray.origin, ray.outwards, ray.direction, cosine, path, medium.extinction * path);
@@ -180,6 +183,7 @@ vec3 through_media(inout Ray ray, int effective, Hit hit, vec3 normal) {
         vec3 far_end = ray.origin + hit.path * ray.direction;
         traced_radiance += ray.throughput * ahead_from_lights(effective, far_end, ray.outwards, ray.direction, medium.extinction * path);
     }
+#endif
     ray.throughput *= passed;
     return passed;
 }
