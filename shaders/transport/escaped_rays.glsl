@@ -90,8 +90,7 @@ vec3 radiance_of_opaque(EscapedRay end) {
     bool has_textures = picture_first == 0 && reads_all_textures(end.object);
     bool has_light = traced_body(end.object).diffuses > 0.5;  // photons in the picture would count twice
     bool is_known = has_light || (has_textures && end.triangle >= 0 && end.blur == 0.0);
-    // A loop in place of a branch: software rasterizers leave it where no ray of a group is hidden.
-    for (bool hidden = is_known || !opaque_in_picture(end, light); hidden; hidden = false) {
+    if (is_known || !opaque_in_picture(end, light)) {
         ObjectRow body = traced_body(end.object);
         if (end.triangle >= 0) { body = body_at(end.object, end.triangle, end.weights, end.width); }
         light = opaque_light(body, end.normal, end.direction, end.point);

@@ -135,16 +135,13 @@ bool follow(inout Photon photon, Hit hit, int channel, inout Draws draws, inout 
         if (photon.bent) { landing = Landing(photon.origin + hit.path * photon.direction, surface.face_normal, true); }
         return false;
     }
-    // A loop in place of a branch: software rasterizers compute a branch for all, and leave a loop that none needs.
-    for (bool goes_on = true; goes_on; goes_on = false) {
-        int after = effective_medium(surface.interior);
-        if (!is_thin_wall(body) && !alters_light(before, after, channel)) {
-            vec3 point = photon.origin + surface.path * photon.direction;
-            photon.origin = origin_beside(point, surface.face_normal, photon.direction, photon.skipped);
-            photon.interior = surface.interior;
-        } else {
-            interact(photon, surface, body, before, after, channel, draws);
-        }
+    int after = effective_medium(surface.interior);
+    if (!is_thin_wall(body) && !alters_light(before, after, channel)) {
+        vec3 point = photon.origin + surface.path * photon.direction;
+        photon.origin = origin_beside(point, surface.face_normal, photon.direction, photon.skipped);
+        photon.interior = surface.interior;
+    } else {
+        interact(photon, surface, body, before, after, channel, draws);
     }
     return !photon.ends;
 }

@@ -78,14 +78,13 @@ void main() {
     Hit hit = known_hit(live_photons[photon_room + at], live_photons[2 * photon_room + at], photon.origin, photon.direction);
     Landing landing = Landing(vec3(0.0), vec3(0.0), false);
     bool lives = follow(photon, hit, channel_of(number), draws, landing);
-    // Loops in place of branches: software rasterizers compute both sides of a branch for all, and leave a loop that none needs.
-    for (bool lands = landing.there; lands; lands = false) {
+    if (landing.there) {
         ivec2 texel = ivec2(uint(place) % PHOTON_WIDTH, uint(place) / PHOTON_WIDTH);
         imageStore(landed_point, texel, vec4(landing.point, 1.0));
         imageStore(landed_power, texel, vec4(power * photon.throughput, 1.0));
         imageStore(landed_normal, texel, vec4(landing.normal, 0.0));
     }
-    for (bool goes_on = lives; goes_on; goes_on = false) { store(place, photon, power, draws); }
+    if (lives) { store(place, photon, power, draws); }
 #endif
     vec3 direction = lives ? photon.direction : vec3(0.0);
     for (int axis = 0; axis < 3; ++axis) {

@@ -41,8 +41,7 @@ void main() {
         intBitsToFloat(ivec2(live_rays[6 * live_rows + number], live_rays[7 * live_rows + number])));
     PrimaryHit primary = PrimaryHit(AIR, vec3(0.0), vec3(0.0), 0.0, 0.0, vec3(0.0), 0.0, uvec2(0u));
     primary.pixel = pixel_number(pixel_of(word));
-    // Loops in place of branches: processors that draw compute both sides of a branch for all rays, and leave a loop that none needs.
-    for (bool begins = depth_of(ray) == 0; begins; begins = false) {
+    if (depth_of(ray) == 0) {
         vec4 front;
         float variance;
         primary = primary_hit(pixel_at(pixel_of(word)), front, variance);
@@ -53,9 +52,9 @@ void main() {
         vec3 throughput;
         EscapedRay end = take_end(throughput);
 #if OPAQUE
-        for (bool on_opaque = end.object != AIR; on_opaque; on_opaque = false) { store_end(2 * at + stored++, end, throughput); }
+        if (end.object != AIR) { store_end(2 * at + stored++, end, throughput); }
 #endif
-        for (bool leaves = end.object == AIR; leaves; leaves = false) { traced_radiance += throughput * radiance_beyond(end); }
+        if (end.object == AIR) { traced_radiance += throughput * radiance_beyond(end); }
         if (ends == 0) { break; }
     }
 #endif
