@@ -58,9 +58,8 @@ uvec4 left_interior(uvec4 interior, int object, out bool missing) {
 
 // The list of a ray through one body alone, which stands in it some times, as that number.
 uint packed_interior(uvec4 interior) {
-    uint count = 0u;
-    for (int word = 0; word < 4; ++word) { count += (interior[word] & 0xffffu) + (interior[word] >> 16); }
-    return count;
+    uvec4 pairs = (interior & 0xffffu) + (interior >> 16);
+    return pairs.x + pairs.y + pairs.z + pairs.w;
 }
 
 uvec4 unpacked_interior(uint count) {
@@ -87,10 +86,14 @@ int effective_medium(uvec4 interior) {
 
 // Whether a body in the interior has holes.
 bool is_in_open_body(uvec4 interior) {
+#if ONE_OBJECT
+    return interior.x != 0u && traced_body(0).not_closed == 1.0;
+#else
     for (; interior.x != 0u; interior = next_entries(interior)) {
         if (traced_body(int(interior.x & 0xffffu) - 1).not_closed == 1.0) { return true; }
     }
     return false;
+#endif
 }
 
 struct Medium {
@@ -122,11 +125,10 @@ Medium medium_in(uvec4 interior, int effective) {
     }
 #if ONE_OBJECT && !PRIORITY && !UNION
     // A body that fills a place twice absorbs twice.
-    int count = 0;
-    for (int i = 0; i < INTERIOR_SIZE; ++i) { count += interior_entry(interior, i) != 0u ? 1 : 0; }
-    sum.extinction *= float(count);
-    sum.emission *= float(count);
-    sum.scattering *= float(count);
+    float count = float(packed_interior(interior));
+    sum.extinction *= count;
+    sum.emission *= count;
+    sum.scattering *= count;
 #endif
 #else
     uvec4 rest = interior;

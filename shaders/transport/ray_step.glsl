@@ -222,6 +222,16 @@ float width_at_hit(vec3 point, float facing) {
 float width_at_hit(vec3 point, float facing) { return 0.0; }
 #endif
 
+// Whether a ray has hit the first interface of its pixel at a point. Without a ray from the eye itself it started a little before.
+bool is_primary(Ray ray, Hit hit, int object, vec3 point, PrimaryHit primary) {
+    if (depth_of(ray) != 0 || object != primary.object) { return false; }
+#if FROM_EYE
+    return distance(point, primary.point) < 1e-3 * surface_reach;
+#else
+    return hit.path < 2e-3 * surface_reach;
+#endif
+}
+
 // Material of the first interface as the rasterizer has it.
 void take_material(inout Interaction at, PrimaryHit primary) {
     at.roughness = primary.roughness;
@@ -379,7 +389,7 @@ int follow_to_end(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, in
     int type = int(body.type);
     if (starts_within(ray, body, surface.outside)) { return pass_on(ray, point, surface.face_normal, ray.interior, ray.outwards); }
     if (!sound && (all_closed == 0 || is_full(ray.interior))) { lose(ray); }
-    bool first = depth_of(ray) == 0 && surface.object == primary.object && distance(point, primary.point) < 1e-3 * surface_reach;
+    bool first = is_primary(ray, hit, surface.object, point, primary);
     vec3 normal = facing_normal(first ? primary.normal : surface.smooth_normal, ray.direction);
     traced_radiance += ray.throughput * surface.emitted;
     ray.throughput *= surface.transmittance;
@@ -424,8 +434,7 @@ int follow(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int chann
 vec3 with_lights(vec3 light, vec3 direction, PrimaryHit primary, vec3 emitted, float variance, bool starts_inside) {
 #if LIGHTS || EMISSION == 2
     vec3 entering = vec3(1.0);
-    // A loop in place of a branch: software rasterizers leave it where no pixel of a group shows an interface.
-    for (bool enters = primary.object != AIR && !starts_inside; enters; enters = false) {
+    if (primary.object != AIR && !starts_inside) {
         Surface surface = surface_of(vec4(float(primary.object), primary.roughness, primary.transmission, variance));
 #if EMISSION == 2
         float cosine = clamp(-dot(primary.normal, direction), 0.0, 1.0);
