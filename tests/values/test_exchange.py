@@ -174,8 +174,9 @@ def test_an_opaque_ball_in_a_ball_takes_what_diffusion_brings_to_it(color: float
     # Fluence phi at the inner ball, which receives phi / (2 (1 + a)).
     on_it = taken / radius**2 / (1.0 - color) if color < 1.0 else np.pi * 1.3**2
     assert field.inclusions is not None
-    place = np.argwhere(field.inclusions[..., 0] > 0.0) * field.step + 0.5 * field.step + field.low
-    near = np.abs(np.linalg.norm(place, axis=1) - radius) < field.step
+    step = field.placement.step
+    place = np.argwhere(field.inclusions[..., 0] > 0.0) * step + 0.5 * step + field.placement.low
+    near = np.abs(np.linalg.norm(place, axis=1) - radius) < step
     values = field.inclusions[field.inclusions[..., 0] > 0.0][near]
     np.testing.assert_allclose(values.mean(), on_it, rtol=0.1)
 

@@ -39,7 +39,7 @@ from translucent.bake.thickness_map import add_uv_file, check_map_output
 from translucent.diffusion.entering import MAP_HEIGHT
 from translucent.diffusion.field import DiffusingBody, DiffusionField
 from translucent.diffusion.lit_body import lit_body
-from translucent.diffusion.sides import read_sides
+from translucent.diffusion.sides import GridPlacement
 from translucent.errors import InputError, TranslucentWarning
 from translucent.files.images import read_exr, write_exr
 from translucent.files.paths import OutputFiles, require_file
@@ -99,25 +99,19 @@ class Transfer:
     ----------
     values : (6, x, y, z, 9, 3) float32
         See `at`.
-    low, turn : (3,), (3, 3) float64
-        Corner of the grid in metres, and its axes, in columns.
-    step : float
-        Side of a cell in metres.
+    placement : GridPlacement
     cells : int
         In the system.
     """
 
     values: Floats
-    low: Array
-    turn: Array
-    step: float
+    placement: GridPlacement
     cells: int
 
     def at(self, points: Array, normals: Array) -> Array:
         """(k, 9, 3): mean subsurface radiance of points of the surface, normals (k, 3), for a unit of each harmonic."""
         flat = self.values.reshape(*self.values.shape[:4], -1)
-        places = (points - self.low) @ self.turn / self.step
-        return read_sides(flat, places, normals @ self.turn).reshape(-1, COUNT, 3)
+        return self.placement.read(flat, points, normals).reshape(-1, COUNT, 3)
 
 
 def exit_radiance(field: DiffusionField, points: Array, normals: Array) -> Array:
@@ -170,7 +164,7 @@ class LitAlone:
             for i in range(1, COUNT):
                 values[..., i, :] = self.field(_harmonic(i)).fluence - UNIFORM * uniform.fluence
             values *= uniform.exit_share / np.pi
-        return Transfer(values, uniform.low, uniform.turn, uniform.step, uniform.cells)
+        return Transfer(values, uniform.placement, uniform.cells)
 
 
 def _harmonic(index: int) -> Environment:

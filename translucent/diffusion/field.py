@@ -29,7 +29,7 @@ from translucent.diffusion.grid import BodyGrid
 from translucent.diffusion.keys import dimming_key, environment_key, kept, light_key, may_dim
 from translucent.diffusion.lit_body import LitBody
 from translucent.diffusion.photons import EnteringPhotons
-from translucent.diffusion.sides import beside, read_sides
+from translucent.diffusion.sides import GridPlacement, beside
 from translucent.diffusion.solution import BodySystem, DiffuseSolution
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, exit_quadrature
@@ -88,12 +88,7 @@ class DiffusionField:
         Fraction of the paths through the body, from its surface, on which light is scattered; 1 deep inside.
     inclusions : (x, y, z, 3) float32, optional
         Irradiance on opaque objects inside, spread beyond their surfaces.
-    low : (3,) float64
-        Corner of the grid in metres.
-    turn : (3, 3) float64
-        Axes of the grid, in its columns.
-    step : float
-        Side of a cell in metres.
+    placement : GridPlacement
     albedo : (3,) float64
         Of single scattering after similarity: sigma_s' / (sigma_a + sigma_s').
     phase : PhaseFunction
@@ -123,9 +118,7 @@ class DiffusionField:
     travel: Volume | None
     scattered: Volume
     inclusions: Volume | None
-    low: Array
-    turn: Array
-    step: float
+    placement: GridPlacement
     albedo: Array
     phase: PhaseFunction
     conductance: float
@@ -188,7 +181,7 @@ class DiffusionField:
         depth = ((1.0 - self.ahead) * optical_depth).mean(axis=1)
         level = directions - np.einsum("ki,ki->k", directions, normals)[:, None] * normals
         along = level * (path * last_event_fraction(depth))[:, None]
-        most = SAMPLE_REACH * self.step
+        most = SAMPLE_REACH * self.placement.step
         return np.asarray(points + along * (most / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), most)))
 
     def scattered_radiance(self, points: Array, normals: Array, directions: Array, cosine: Array) -> Array:
@@ -204,9 +197,9 @@ class DiffusionField:
             return self._emergent(fluence, entering, cosine)
         travel = self.at_surface(self.travel, points, normals) - 1.0
         # What comes through the body and goes on ahead is found by renderers: see `scattered_ahead`.
-        outwards = np.maximum((travel * (normals @ self.turn)).sum(axis=1), 0.0)
+        outwards = np.maximum((travel * (normals @ self.placement.turn)).sum(axis=1), 0.0)
         lit = 1.0 - np.minimum(outwards / np.maximum(cosine, LEAST_COSINE), 1.0)[:, None]
-        return self._emergent(fluence, entering, cosine, travel, directions @ self.turn, lit)
+        return self._emergent(fluence, entering, cosine, travel, directions @ self.placement.turn, lit)
 
     def irradiance_entering(self, points: Array, normals: Array) -> Array:
         """(k, 3): irradiance across its direction of light that enters at points (k, 3) with normals (k, 3)."""
@@ -221,7 +214,7 @@ class DiffusionField:
 
     def at_surface(self, volume: Volume, points: Array, normals: Array) -> Array:
         """(k, n): values (6, x, y, z, n) of cells at points (k, 3) of the surface with normals (k, 3)."""
-        return read_sides(volume, (points - self.low) @ self.turn / self.step, normals @ self.turn)
+        return self.placement.read(volume, points, normals)
 
     def _emergent(
         self,
@@ -452,9 +445,7 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
         inclusions=inclusions,
         travel=travel[0] if directed else None,
         scattered=on_paths,
-        low=lit.pose.outwards(grid.cells.low) + lit.pose.shift,
-        turn=lit.pose.turn,
-        step=grid.cells.step,
+        placement=GridPlacement.of(grid.cells, lit.pose),
         albedo=albedo,
         phase=medium.phase_function,
         conductance=interface.conductance,

@@ -24,7 +24,7 @@ from translucent.diffusion.exchange import ROUNDS, OpaqueSurfaces, cosine_direct
 from translucent.diffusion.grid import BodyGrid, body_grid, nearest_samples
 from translucent.diffusion.lit_body import own_frame
 from translucent.diffusion.photons import BATCH, MOST_SURFACES, Photons, PhotonSegmentTracer, joined
-from translucent.diffusion.sides import SurfaceSides, beside, read_sides
+from translucent.diffusion.sides import GridPlacement, SurfaceSides, beside
 from translucent.scene.scene import Scene
 
 #: Samples on each object, of all together, and paths from each: the fit of the volume takes the mean of about 16.
@@ -44,19 +44,12 @@ class IrradianceMap:
         It is inside bodies, and photons have carried the light of all lights there.
     values : (6, x, y, z, 3) float32
         For each side, see `SurfaceSides`; as basic radiance, E / n^2 in a medium of index n.
-    low : (3,) float64
-        Corner of the grid in metres.
-    turn : (3, 3) float64
-        Axes of the grid, in its columns.
-    step : float
-        Side of a cell in metres.
+    placement : GridPlacement
     """
 
     lit: bool
     values: Floats
-    low: Array
-    turn: Array
-    step: float
+    placement: GridPlacement
 
     @property
     def volumes(self) -> tuple[Floats]:
@@ -65,15 +58,12 @@ class IrradianceMap:
 
     def holds(self, points: Array) -> npt.NDArray[np.bool_]:
         """(k,): whether points (k, 3) of the world are in the volume."""
-        place = self._places(points)
+        place = self.placement.places(points)
         return np.asarray(((place >= 0.0) & (place <= self.values.shape[1:4])).all(axis=1))
 
     def at(self, points: Array, normals: Array) -> Array:
         """(k, 3): irradiance at points (k, 3) of the surface with normals (k, 3)."""
-        return read_sides(self.values, self._places(points), normals @ self.turn)
-
-    def _places(self, points: Array) -> Array:
-        return np.asarray((points - self.low) @ self.turn / self.step)
+        return self.placement.read(self.values, points, normals)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,10 +87,8 @@ class _Samples:
         return nearest_samples(self.points, self.normals, self.grid.area, places, towards)
 
     def map(self, irradiance: Array, *, lit: bool) -> IrradianceMap:
-        cells = self.grid.cells
         (values,) = SurfaceSides.of(self.grid).volumes([(irradiance[self.numbers], 0.0)])
-        low = self.pose.outwards(cells.low) + self.pose.shift
-        return IrradianceMap(lit, values, low, self.pose.turn, cells.step)
+        return IrradianceMap(lit, values, GridPlacement.of(self.grid.cells, self.pose))
 
 
 def irradiance_maps(scene: Scene, objects: Sequence[int], photons: int = 0) -> dict[int, IrradianceMap]:

@@ -19,7 +19,9 @@ from scipy.ndimage import map_coordinates
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask
+from translucent.diffusion.entering import Pose
 from translucent.diffusion.grid import BodyGrid
+from translucent.diffusion.voxels import Voxels
 from translucent.formulas.diffusion import SAMPLE_REACH
 
 #: Directions: two along each axis.
@@ -169,6 +171,38 @@ def side_weights(normals: Array) -> Array:
     found = np.zeros((len(normals), SIDES))
     found[:, 0::2], found[:, 1::2] = np.where(normals >= 0.0, parts, 0.0), np.where(normals < 0.0, parts, 0.0)
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class GridPlacement:
+    """Where in the world the cells of a body are.
+
+    Attributes
+    ----------
+    low : (3,) float64
+        Corner of the grid in metres.
+    turn : (3, 3) float64
+        Axes of the grid, in its columns.
+    step : float
+        Side of a cell in metres.
+    """
+
+    low: Array
+    turn: Array
+    step: float
+
+    @classmethod
+    def of(cls, cells: Voxels, pose: Pose) -> GridPlacement:
+        """Placement of cells of a body in its own frame, which is at a pose."""
+        return cls(pose.outwards(cells.low) + pose.shift, pose.turn, cells.step)
+
+    def places(self, points: Array) -> Array:
+        """(k, 3): places in the grid, in cells, of points (k, 3) of the world."""
+        return np.asarray((points - self.low) @ self.turn / self.step)
+
+    def read(self, volume: Floats, points: Array, normals: Array) -> Array:
+        """(k, n): values (6, x, y, z, n) of cells at points (k, 3) of the surface with normals (k, 3)."""
+        return read_sides(volume, self.places(points), normals @ self.turn)
 
 
 def read_sides(volume: Floats, places: Array, normals: Array) -> Array:

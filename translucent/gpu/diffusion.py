@@ -108,11 +108,12 @@ class DiffusedTexture:
         self, number: int, own: DiffusionField | IrradianceMap, size: tuple[int, ...], center: Array
     ) -> dict[str, npt.ArrayLike]:
         """Fields that place the grid of an object."""
+        axes = own.placement.turn.T / own.placement.step
         return {
-            "grid_low": own.low - center,
-            "grid_x": own.turn[:, 0] / own.step,
-            "grid_y": own.turn[:, 1] / own.step,
-            "grid_z": own.turn[:, 2] / own.step,
+            "grid_low": own.placement.low - center,
+            "grid_x": axes[0],
+            "grid_y": axes[1],
+            "grid_z": axes[2],
             "grid_size": size,
             "first_layer": self.first_layers[number],
         }
