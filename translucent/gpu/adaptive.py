@@ -59,6 +59,9 @@ APART = 2.0
 #: median. Isolated pixels have at most so many samples, in those of the picture.
 ISOLATED, ALONE, LEAST_SPREAD, MOST_AGAIN = 3.0, 0.4, 0.015, 8
 
+#: Samples of an isolated pixel at one place in it: their microfacets differ, and the first interfaces are drawn once.
+AT_ONE_PLACE = 4
+
 #: Standard errors up to which noise explains how far a pixel is off: of a normal distribution, all but one of 370 are
 #: within, and means of skewed ones are further off only with samples that make their errors as large.
 BY_CHANCE = 3.0
@@ -152,6 +155,8 @@ class AdaptiveSampling:
         self, job: FrameJob, number: int, shift: tuple[float, float], run_passes: Run, leave_out: tuple[PassName, ...]
     ) -> None:
         job.sample = number
+        if shift == job.view.shift:  # the first interfaces are there
+            leave_out = (*leave_out, PassName.INTERFACES)
         job.place(shift)
         run_passes(leave_out)
 
@@ -163,9 +168,10 @@ class AdaptiveSampling:
         first, last = _most(samples), MOST_AGAIN * samples
         # Nothing opaque is in front of these pixels, and what is behind is known.
         leave_out = _left_out(job, mirror=False, needed=(PassName.INTERFACES, PassName.TRACED))
-        shifts = sobol_points(last)[first:]
+        shifts = sobol_points(last)[first:][: (last - first) // AT_ONE_PLACE]
+        places = [(right, down) for right, down in (shifts - shifts.mean(axis=0)).tolist() for _ in range(AT_ONE_PLACE)]
         left = 0
-        for number, shift in enumerate((shifts - shifts.mean(axis=0)).tolist(), first):
+        for number, shift in enumerate(places, first):
             if (number - first) % samples == 0:
                 # What is still there after as many samples again is a thing of the scene.
                 before, left = left, self._mark_isolated(job, samples)
