@@ -5,6 +5,9 @@ uniform sampler2D entered;             // interface towards the eye: normal, axi
 uniform sampler2D surface_parameters;  // of what is entered: object, roughness, transmission, variance of normals
 uniform sampler2D surface_color;
 
+uniform int enlarges;  // 1: parts of some pixels are drawn, each of which fills a block of pixels
+uniform vec2 enlarged_pixels[ENLARGED_ACROSS * ENLARGED_ACROSS];  // columns and rows of these, in the order of the blocks
+
 // A pixel of the frame that is drawn.
 struct Pixel {
     ivec2 here;        // in what is drawn, whose row 0 is the top one
@@ -21,6 +24,10 @@ uvec2 pixel_number(ivec2 here) {
 Pixel pixel_at(ivec2 here) {
     vec2 center = vec2(here) + 0.5;
     vec2 sampled = center + frame_size.zw;
+    if (enlarges == 1) {
+        ivec2 block = here / PIXEL_PARTS;
+        sampled = enlarged_pixels[block.y * ENLARGED_ACROSS + block.x] + (center - vec2(PIXEL_PARTS * block)) / float(PIXEL_PARTS);
+    }
     return Pixel(here, ivec2(center.x, frame_size.y - center.y), pixel_number(here), sampled,
         normalize(view_ray(sampled, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz)));
 }

@@ -11,8 +11,8 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.formulas.color import LUMINANCE_WEIGHTS
 from translucent.formulas.sampling import sample_shifts, sobol_points
+from translucent.gpu.constants import ENLARGED_ACROSS, PIXEL_PARTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.caustics import ROUNDS, ROUNDS_FROM
 from translucent.gpu.passes.opaque import is_smooth
@@ -25,6 +25,7 @@ from translucent.gpu.targets import add_up, read_floats
 from translucent.planning.passes import PassName
 
 Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
 
 #: Of 16 samples, the largest standard error that is as good as none, as a fraction of the light: a step of a picture
 #: with 8 bits in the middle of its range, by the slope of the curve of sRGB, (2.4 / (0.5 + 0.055)) / 255. With more
@@ -54,17 +55,12 @@ EDGES, NOISE = {"prior": 4.0, "by_edges": 1.0 / 3.0}, {"prior": 1e6, "by_edges":
 #: samples that agree may all have missed what is smaller than the pixel, or may all have hit it.
 APART = 2.0
 
-#: Of rough interfaces, a pixel is isolated that is farther from the median of the eight around it than so many spreads
-#: of the 24 around it, and from each of the eight by a fraction of that; and the least spread, as a fraction of the
-#: median. Isolated pixels have at most so many samples, in those of the picture.
-ISOLATED, ALONE, LEAST_SPREAD, MOST_AGAIN = 3.0, 0.4, 0.015, 8
+#: A pixel is isolated that is farther from the median of the eight around it than so many spreads of the 24 around it,
+#: and from each of the eight by a fraction of that; and the least spread, as a fraction of the median.
+ISOLATED, ALONE, LEAST_SPREAD = 3.5, 0.45, 0.015
 
-#: Samples of an isolated pixel at one place in it: their microfacets differ, and the first interfaces are drawn once.
-AT_ONE_PLACE = 4
-
-#: Standard errors up to which noise explains how far a pixel is off: of a normal distribution, all but one of 370 are
-#: within, and means of skewed ones are further off only with samples that make their errors as large.
-BY_CHANCE = 3.0
+#: How often isolated pixels are looked for, at most: one may hide the next.
+ROUNDS_AGAIN = 2
 
 #: Samples from which those of the first look are chosen.
 _CHOICE = 32
@@ -147,7 +143,8 @@ class AdaptiveSampling:
                 clock.left = left
             self._trace_sample(job, number, shift, run_passes, leave_out)
             clock.bent(number)
-        if samples > FIRST_LOOK and _is_rough(job):
+        # Of what media add along straight rays, and of layers behind the first interface, parts of pixels know nothing.
+        if samples > FIRST_LOOK and _left_out(job, mirror=False, needed=_NEEDED) != _DONE:
             self._settle_isolated(job, samples, run_passes)
         job.bending = False
 
@@ -155,48 +152,73 @@ class AdaptiveSampling:
         self, job: FrameJob, number: int, shift: tuple[float, float], run_passes: Run, leave_out: tuple[PassName, ...]
     ) -> None:
         job.sample = number
-        if shift == job.view.shift:  # the first interfaces are there
-            leave_out = (*leave_out, PassName.INTERFACES)
         job.place(shift)
         run_passes(leave_out)
 
     def _settle_isolated(self, job: FrameJob, samples: int, run_passes: Run) -> None:
-        """Take more samples of single pixels far off their neighbors, whose random microfacets went wrong together.
+        """Take a sample of each of 8 x 8 parts of single pixels far off their neighbors.
 
-        The choice by what was found takes from the mean of the picture a part of what these pixels exceed it by.
+        Their own samples may all have missed what is smaller than the pixel, or have hit it too often; and highlights
+        are as wide as the normals within a sample. A pixel is drawn as a block of pixels, so that a few steps take the
+        samples of many. They take the place of those before, which chose the pixel as they were far off: the mean of
+        all would be biased. Random microfacets may go wrong again, and are added up.
         """
-        first, last = _most(samples), MOST_AGAIN * samples
-        # Nothing opaque is in front of these pixels, and what is behind is known.
-        leave_out = _left_out(job, mirror=False, needed=(PassName.INTERFACES, PassName.TRACED))
-        shifts = sobol_points(last)[first:][: (last - first) // AT_ONE_PLACE]
-        places = [(right, down) for right, down in (shifts - shifts.mean(axis=0)).tolist() for _ in range(AT_ONE_PLACE)]
-        left = 0
-        for number, shift in enumerate(places, first):
-            if (number - first) % samples == 0:
-                # What is still there after as many samples again is a thing of the scene.
-                before, left = left, self._mark_isolated(job, samples)
-                if left in (0, before):
-                    break
-            self._trace_sample(job, number, shift, run_passes, leave_out)
+        rough, targets, shown, most = _is_rough(job), job.targets, job.view.shift, ENLARGED_ACROSS**2
+        light = read_floats(targets["bent"], 0, 4)
+        inside = (light[..., 3] > 0) & (read_floats(targets["average"], 0, 4)[..., 3] == 0)
+        inside &= min(targets.size) >= PIXEL_PARTS * ENLARGED_ACROSS
+        settled, sums = np.zeros(inside.shape, bool), [light]
+        for number in range(ROUNDS_AGAIN):
+            level = light[..., :3].sum(axis=-1) / np.where(inside, light[..., 3], 1.0)
+            found = isolated_pixels(level, inside) & (rough | ~settled)
+            if not found.any():
+                break
+            if not number:
+                sums.append(read_floats(targets["bent"], 1, 4))
+            job.sample, pixels = _most(samples) + number, np.argwhere(found)
+            for first in range(0, len(pixels), most):
+                rows, columns = pixels[first : first + most].T
+                for whole, part in zip(sums, self._enlarged(job, columns, rows, run_passes), strict=True):
+                    whole[rows, columns] = part + settled[rows, columns, None] * whole[rows, columns]
+            settled |= found
+        if settled.any():
+            for attachment, whole in zip(targets["bent"].color_attachments, sums, strict=True):
+                attachment.write(whole)
+            # Who asks for what the last sample shows finds it.
+            job.place(shown)
+            run_passes(_all_but(job, PassName.INTERFACES))
 
-    def _mark_isolated(self, job: FrameJob, samples: int) -> int:
-        """Mark the isolated pixels that show interfaces alone; returns how many there are."""
-        light, beside = (read_floats(job.targets[name], 0, 4) for name in ("bent", "average"))
-        taken = light[..., 3]
-        inside = (taken > 0) & (beside[..., 3] == 0)
-        level = light[..., :3].sum(axis=-1) / np.where(inside, taken, 1.0)
-        mean = light[..., :3] @ np.array(LUMINANCE_WEIGHTS, np.float32)
-        # Few samples may go wrong together: their deviation tells nothing.
-        known = inside & (taken >= samples) & (mean > 0.0)
-        shares = read_floats(job.targets["bent"], 1, 4)[..., 0] / np.square(np.where(known, mean, 1.0))
-        error = np.where(known, level * np.sqrt(np.maximum(shares - 1.0 / np.where(known, taken, 1.0), 0.0)), np.inf)
-        found = isolated_pixels(level, inside, error)
-        for name in ("unsettled", "mirror_unsettled"):
-            if name == "unsettled" or job.mirror is not None:
-                job.targets[name].clear()
-        job.targets["unsettled"].color_attachments[0].write(found.astype(np.float32).tobytes())
-        job.unsettled = {"unsettled": pixel_words(found), "mirror_unsettled": pixel_words(np.zeros_like(found))}
-        return int(found.sum())
+    def _enlarged(self, job: FrameJob, columns: Ints, rows: Ints, run_passes: Run) -> list[Floats]:
+        """Sums (n, 4) of the light of the parts of some pixels, and of its square, as `bent` has them."""
+        entered, bent, height = job.targets["entered"], job.targets["bent"], job.targets.size[1]
+        marks = np.zeros((height, job.targets.size[0]), np.float32)
+        blocks = [Part(left, top, left + PIXEL_PARTS, top + PIXEL_PARTS) for top, left in _corners(len(rows))]
+        job.enlarged = list(zip(columns.tolist(), rows.tolist(), strict=True))
+        try:
+            for block, (column, row) in zip(blocks, job.enlarged, strict=True):
+                job.enlarge(column, row, block)
+                entered.scissor = block.flipped(height).scissor
+                run_passes(_all_but(job, PassName.INTERFACES))
+                marks[block.bottom : block.top, block.left : block.right] = 1.0
+        finally:
+            entered.scissor = None
+        job.unsettled = {"unsettled": pixel_words(marks > 0.0), "mirror_unsettled": np.zeros(0, np.uint32)}
+        if job.mirror is not None:
+            job.targets["mirror_unsettled"].clear()
+        job.targets["unsettled"].color_attachments[0].write(marks)
+        drawn = Part(0, 0, max(block.right for block in blocks), blocks[-1].top)
+        job.place((0.0, 0.0))
+        job.covered = drawn.flipped(height)
+        for attachment in bent.color_attachments:
+            attachment.write(np.zeros((drawn.top, drawn.right, 4), np.float32), viewport=drawn.scissor)
+        run_passes(_all_but(job, PassName.TRACED))
+        job.enlarged = None
+        found = (bent.read(drawn.scissor, 4, attachment=number, dtype="f4") for number in range(2))
+        shape = drawn.top // PIXEL_PARTS, PIXEL_PARTS, drawn.right // PIXEL_PARTS, PIXEL_PARTS, 4
+        return [
+            np.frombuffer(part, np.float32).reshape(shape).sum(axis=(1, 3)).reshape(-1, 4)[: len(rows)]
+            for part in found
+        ]
 
     def _hold_opaque(self, job: FrameJob, shifts: Sequence[tuple[float, float]], run_passes: Run) -> None:
         """Draw the opaque objects in a few samples, whose mean all samples then show.
@@ -317,11 +339,8 @@ def uneven_part(light: Floats, difference: float) -> Part:
     return bounds.wider(1, (level.shape[1], level.shape[0]))
 
 
-def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_], error: Floats | None = None) -> npt.NDArray[np.bool_]:
-    """(h, w): pixels of a picture (h, w) far off their neighbors, if these all are `inside` (h, w).
-
-    Where the standard error (h, w) is known, only those that noise explains: others are things of the scene.
-    """
+def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """(h, w): pixels of a picture (h, w) far off their neighbors, if these all are `inside` (h, w)."""
     found, (height, width) = np.zeros(level.shape, bool), level.shape
     steps = [(y, x) for y in range(-2, 3) for x in range(-2, 3) if (y, x) != (0, 0)]
     padded = np.pad(inside, 1)
@@ -338,8 +357,6 @@ def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_], error: Floats 
     spread = 1.4826 * np.median(np.abs(wide - np.median(wide, axis=0)), axis=0)
     distance = np.abs(own - median)
     far = (distance > ISOLATED * np.maximum(spread, LEAST_SPREAD * np.abs(median))) & (off > ALONE * distance)
-    if error is not None:
-        far &= distance <= BY_CHANCE * error[row, column]
     found[row[far], column[far]] = True
     return found
 
@@ -416,6 +433,16 @@ def _central_first(samples: int) -> list[tuple[float, float]]:
     if len(more):
         shifts = np.concatenate([shifts, more - more.mean(axis=0)])
     return [(right, down) for right, down in shifts.tolist()]
+
+
+def _corners(count: int) -> list[tuple[int, int]]:
+    """Top and left of so many blocks of parts of pixels."""
+    return [(PIXEL_PARTS * (i // ENLARGED_ACROSS), PIXEL_PARTS * (i % ENLARGED_ACROSS)) for i in range(count)]
+
+
+def _all_but(job: FrameJob, name: PassName) -> tuple[PassName, ...]:
+    """All passes of a job but one."""
+    return tuple(step.name for step in job.plan.passes if step.name != name)
 
 
 def _left_out(job: FrameJob, *, mirror: bool, needed: tuple[PassName, ...]) -> tuple[PassName, ...]:

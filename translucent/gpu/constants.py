@@ -85,6 +85,9 @@ STORAGE_BINDINGS = {
     "first_pixels": 8,
 }
 
+#: Parts along a side of a pixel that is drawn enlarged, and such pixels along a side of what is drawn.
+PIXEL_PARTS, ENLARGED_ACROSS = 8, 4
+
 #: Invocations in a group of a compute shader.
 COMPUTE_GROUP = 64
 
@@ -186,6 +189,8 @@ CONSTANTS: dict[str, str] = {
     **{f"{name.upper()}_BINDING": str(point) for name, point in STORAGE_BINDINGS.items()},
     "COMPUTE_GROUP": str(COMPUTE_GROUP),
     "SMALLEST_HIGHLIGHT": "1e-3",  # alpha of the microfacets in which points of light are mirrored
+    "PIXEL_PARTS": str(PIXEL_PARTS),
+    "ENLARGED_ACROSS": str(ENLARGED_ACROSS),
     "LEAST_VISIBLE": "0.25",  # fraction of an average over a sample by which a highlight at a silhouette is divided
     "FAINTEST_HIGHLIGHT": "1e-6",  # of a light's irradiance, in 1/sr, for which occluders are not looked for
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import moderngl
@@ -62,7 +62,7 @@ from translucent.gpu.uniforms import (
 from translucent.planning.passes import PassSpec
 from translucent.planning.render_plan import RenderPlan
 from translucent.scene.backdrop import Backdrop
-from translucent.scene.camera import Camera
+from translucent.scene.camera import Camera, Window
 from translucent.scene.grounds import Mirror, mirror_of
 
 
@@ -265,6 +265,8 @@ class FrameJob(CameraView):
         Of a sample, that alone is drawn now.
     unsettled : dict of str to (n,) uint32
         Of a job that is bending: pixels that need more samples, by the name of their target.
+    enlarged : list of (int, int), optional
+        Columns and rows of pixels whose parts are drawn, each as a block of pixels from the top left corner on.
     few_opaque : bool
         Opaque objects are shaded in a few samples, before all others, which show the mean of these.
     uneven : Part, optional
@@ -286,6 +288,7 @@ class FrameJob(CameraView):
     for_map = path_only = two_media = projected_depth = bent_apart = bending = any_eye = False
     few_opaque = holds_opaque = has_blurs = False
     uneven: Part | None = None
+    enlarged: list[tuple[int, int]] | None = None
     photon_light: tuple[moderngl.Texture, int, tuple[int, int]] | None = None
 
     def __init__(
@@ -369,6 +372,14 @@ class FrameJob(CameraView):
         self.uniforms.place(self.view)
         self.covered = part_of(self._extents[scene.filled], shift, self.targets.size)
         self._cleared.clear()
+
+    def enlarge(self, column: int, row: int, block: Part) -> None:
+        """Write the uniforms for a pixel that is drawn as a square block of pixels, rows down."""
+        camera, size, parts = self.scene.camera, self.targets.size, block.right - block.left
+        window = camera.window or Window(0, 0, size)
+        left, top = parts * (window.left + column) - block.left, parts * (window.top + row) - block.bottom
+        enlarged = Window(left, top, (parts * window.whole[0], parts * window.whole[1]))
+        self.uniforms.place(SampleView(replace(camera, window=enlarged), size))
 
     def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
         """Draw the objects that are in view, with the current state."""

@@ -70,7 +70,7 @@ class InterfacesPass:
                 job.resources.textures.bind(surface, program, len(_DRAWN_SAMPLERS))
                 set_uniform(program, "surface_color", (*np.asarray(surface.color), surface.transmission))
                 set_uniform(program, "surface_roughness", surface.roughness)
-                set_used(program, {"sample_area": 1.0 / job.samples})
+                set_used(program, {"sample_area": 1.0 if job.enlarged else 1.0 / job.samples})
                 held = program, surface
             if holes:
                 set_uniform(program, "hole_below", surface.alpha_cutoff)

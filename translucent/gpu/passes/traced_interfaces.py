@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.formulas.sampling import FOOTPRINT_STEP, MOST_POINTS, sobol_points
+from translucent.gpu.constants import ENLARGED_ACROSS
 from translucent.gpu.context import require_interfaces
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.job import FrameJob
@@ -116,6 +117,7 @@ class TracedInterfacesPass:
         values = {
             "mirrored": 0,
             "adaptive": int(job.bending),
+            "enlarges": int(job.enlarged is not None),
             "faintest_throughput": faintest_throughput(forks),
             "most_interfaces": depth,
             "microfacet_points": microfacet_points(job.sample),
@@ -127,6 +129,8 @@ class TracedInterfacesPass:
             **_ground_shadows(job, switches),
             **_footprint(job),
         }
+        if job.enlarged is not None:
+            values["enlarged_pixels"] = job.enlarged + [(0, 0)] * (ENLARGED_ACROSS**2 - len(job.enlarged))
         if mirror is not None and (by_depth or shades_all):
             # What is drawn next finds zeros. Software rasterizers compile a program again for every other state.
             if shades_all and not sums:
