@@ -46,6 +46,9 @@ RECENT, FREE, LEAST_SHARE = 16, 0.010, 1.0 / 3.0
 #: Fraction of its budget after which a frame that makes what a picture needs leaves the drawing to the next one.
 PREPARING = 0.5
 
+#: Largest time in seconds of a step of a picture at rest: with the rest of the window, a frame takes up to 100 ms.
+AT_REST = 0.085
+
 #: Factors by which a picture is coarser while it moves; the largest where rays are traced or shadows drawn, and nobody
 #: knows yet for how long.
 FACTORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 16.0)
@@ -165,15 +168,15 @@ class StepTimes:
     def stride(self, plan: RenderPlan | None, budget: float) -> int:
         """Stride of a picture at rest whose steps are expected to take so many seconds; the largest if unknown.
 
-        They may take longer by the factor by which the whole picture is there sooner than by the next larger stride:
-        each step draws all triangles, and costs the window a frame.
+        They may take longer by the factor by which the whole picture is there sooner than by the next larger stride, up
+        to `AT_REST`: each step draws all triangles, and costs the window a frame.
         """
         if plan is None:
             return STRIDES[0]
         chosen = STRIDES[-1]
         for finer in self._tried(plan, STRIDES[:-1])[::-1]:
             before, after = (stride**2 * (self.known(plan, stride) + FREE) for stride in (chosen, finer))
-            if self.known(plan, finer) > budget * before / after:
+            if self.known(plan, finer) > max(budget, min(budget * before / after, AT_REST)):
                 break
             chosen = finer
         return chosen
