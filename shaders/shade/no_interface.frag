@@ -9,6 +9,8 @@
 #include "lib/ray.glsl"
 #include "shade/background.glsl"
 
+uniform float weight;  // samples that this one counts as
+
 #if !REST
 uniform sampler2D emitted_radiance_sum;
 uniform sampler2D straight_transmittance;
@@ -48,4 +50,6 @@ void main() {
     out_transmittance = none ? vec4(through, 1.0) : vec4(0.0);
 #endif
 #endif
+    out_radiance *= weight;
+    out_transmittance *= weight;
 }

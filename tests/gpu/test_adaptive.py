@@ -95,6 +95,16 @@ def test_what_a_ground_mirrors_is_that_of_all_samples(renderer: tl.Renderer, mon
     assert taken[0][taken[0] > 0].mean() < 13.0
 
 
+def test_a_ground_that_fills_the_picture_is_that_of_all_samples(renderer: tl.Renderer) -> None:
+    """Beyond the bodies it is drawn once, and counts as all samples."""
+    above = tl.Camera.look_at((0.3, 6.0, 3.0), (0.0, -0.7, 0.0), fov_y=40.0)
+    scene = dataclasses.replace(on_a_polished_ground(), camera=above)
+    few, every = (renderer.render(scene, SIZE, samples=16, adaptive=adaptive) for adaptive in (True, False))
+    off = np.abs(few.radiance / every.radiance - 1.0)[~every.coverage]
+    assert np.quantile(off, 0.9) < 1e-3  # but in the mirror image of the ball
+    np.testing.assert_allclose(few.transmittance, every.transmittance, rtol=1e-6)
+
+
 def _without_a_coat(ground: tl.Object) -> tl.Object:
     assert ground.surface is not None
     return dataclasses.replace(ground, surface=dataclasses.replace(ground.surface, ior=1.0))

@@ -233,7 +233,8 @@ class AdaptiveSampling:
             run_passes(others)
             if number == 0:
                 self._add_opaque(job, 1)
-                job.uneven = uneven_part(read_floats(mean, 0, 4)[..., :3], DIFFERENCE_TO_ERROR * MIRROR_ERROR)
+                light = read_floats(mean, 0, 4)
+                job.uneven = uneven_part(light[..., :3], DIFFERENCE_TO_ERROR * MIRROR_ERROR)
                 mean.clear(viewport=job.uneven.scissor)
             self._add_opaque(job, len(ROUNDS), job.uneven)
         self._part.bind(sampled=mean.color_attachments[0])
@@ -241,6 +242,9 @@ class AdaptiveSampling:
         self._gl.enable_only(moderngl.NOTHING)
         self._part.draw_fullscreen(self._part.program(HELD=True))
         job.holds_opaque = True
+        if job.covered and (light[..., 3] > 0.0).all():  # a ground has no holes
+            job.covered = job.covered.wider(1, job.targets.size)  # of samples less than a pixel apart
+            job.shows_ground_alone = True
 
     def _add_opaque(self, job: FrameJob, samples: int, part: Part | None = None) -> None:
         """Add a sample of the opaque objects to their mean, in all of the picture or in a part."""

@@ -273,6 +273,8 @@ class FrameJob(CameraView):
         Pixels in which the rest of these samples are shaded, rows up; the light of others is there.
     holds_opaque : bool
         That mean is there.
+    shows_ground_alone : bool
+        Wherever no medium covers the picture it shows that mean, in all samples. What is covered is the same for these.
     has_blurs : bool
         That mean has its blurred levels.
     any_eye : bool
@@ -286,7 +288,7 @@ class FrameJob(CameraView):
 
     corner: tuple[int, int] = (0, 0)
     for_map = path_only = two_media = projected_depth = bent_apart = bending = any_eye = False
-    few_opaque = holds_opaque = has_blurs = False
+    few_opaque = holds_opaque = has_blurs = shows_ground_alone = False
     uneven: Part | None = None
     enlarged: list[tuple[int, int]] | None = None
     photon_light: tuple[moderngl.Texture, int, tuple[int, int]] | None = None
@@ -370,7 +372,8 @@ class FrameJob(CameraView):
         depths = depth_range(scene.boxes, scene.camera, scene.diagonal) if with_depth else None
         self.view = SampleView(scene.camera, self.targets.size, shift, depths, self.corner)
         self.uniforms.place(self.view)
-        self.covered = part_of(self._extents[scene.filled], shift, self.targets.size)
+        if not self.shows_ground_alone:
+            self.covered = part_of(self._extents[scene.filled], shift, self.targets.size)
         self._cleared.clear()
 
     def enlarge(self, column: int, row: int, block: Part) -> None:

@@ -117,7 +117,15 @@ class NoInterface:
             switches |= {"ONE_INTERFACE": False, "APART": False}
             job.gl.enable_only(blending)
         job.gl.depth_func = "1"
-        self._variants.draw_part(Part(0, 0, *job.targets.size), self._variants.program(**switches), framebuffer)
+        program = self._variants.program(**switches)
+        set_uniform(program, "weight", 1.0)
+        if not job.shows_ground_alone:
+            self._variants.draw_part(Part(0, 0, *job.targets.size), program, framebuffer)
+        else:
+            self._variants.draw_covered(job, program, framebuffer, top_first=True)
+            if job.sample == 0:  # the rest is the same in all samples
+                set_uniform(program, "weight", float(job.samples))
+                self._variants.draw_rest(job, program, framebuffer, top_first=True)
         job.gl.depth_func = "<"
 
 
