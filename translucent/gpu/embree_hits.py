@@ -87,7 +87,11 @@ class _EmbreePart:
         """Nearest surfaces, of those within some metres where `reach` is given."""
         with np.errstate(under="ignore", over="ignore", invalid="ignore"):
             # From the middle before anything is multiplied: near a tiny body far from the center little is rounded.
-            local, along = self._turned(origins - self.middle), self._turned(directions)
+            # By columns: loops over three numbers of a row take four times as long.
+            offsets = np.empty(origins.shape, np.float32)
+            for axis in range(3):
+                np.subtract(origins[:, axis], self.middle[axis], out=offsets[:, axis])
+            local, along = self._turned(offsets), self._turned(directions)
             local *= self.scale
             ahead: Floats | None = None
             if not max(local.max(initial=0.0), -local.min(initial=0.0)) <= FAR_AWAY / np.sqrt(3.0):  # or NaN
@@ -96,13 +100,12 @@ class _EmbreePart:
             if end is not None and ahead is not None:
                 end -= ahead
             found = self.scene.run(local, along, end, output=True)
-            path, missed = found["tfar"], found["primID"] < 0
+            path, missed = found["tfar"], np.flatnonzero(found["primID"] < 0)
             if ahead is not None:
                 path += ahead
             path /= self.scale
-        np.copyto(path, _NOTHING, where=missed)
-        objects = self.objects[0] if len(self.objects) == 1 else self.objects.take(found["geomID"], mode="clip")
-        objects = np.where(missed, np.int32(-1), objects)
+        objects = self.objects.take(found["geomID"], mode="clip")
+        path[missed], objects[missed] = _NOTHING, -1
         return RayHits(path, objects, found["primID"], np.stack([found["u"], found["v"]]))
 
     def _starts_ahead(self, local: Floats, along: Floats) -> Floats:
