@@ -59,8 +59,9 @@ APART = 2.0
 #: and from each of the eight by a fraction of that; and the least spread, as a fraction of the median.
 ISOLATED, ALONE, LEAST_SPREAD = 3.5, 0.45, 0.015
 
-#: How often isolated pixels are looked for, at most: one may hide the next.
-ROUNDS_AGAIN = 2
+#: How often isolated pixels are looked for, at most: one may hide the next. And how many may be drawn enlarged, so that
+#: it takes a few percent of the time of a large picture: those that are farthest off. Rough interfaces show more noise.
+ROUNDS_AGAIN, MOST_ENLARGED, MOST_ROUGH_ENLARGED = 3, 64, 1024
 
 #: Samples from which those of the first look are chosen.
 _CHOICE = 32
@@ -167,21 +168,24 @@ class AdaptiveSampling:
         light = read_floats(targets["bent"], 0, 4)
         inside = (light[..., 3] > 0) & (read_floats(targets["average"], 0, 4)[..., 3] == 0)
         inside &= min(targets.size) >= PIXEL_PARTS * ENLARGED_ACROSS
-        settled, sums = np.zeros(inside.shape, bool), [light]
+        settled, sums, drawn = np.zeros(inside.shape, bool), [light], 0
+        limit = MOST_ROUGH_ENLARGED if rough else MOST_ENLARGED
         for number in range(ROUNDS_AGAIN):
             level = light[..., :3].sum(axis=-1) / np.where(inside, light[..., 3], 1.0)
-            found = isolated_pixels(level, inside) & (rough | ~settled)
-            if not found.any():
+            spreads = isolated_pixels(level, inside) * (rough | ~settled)
+            pixels = np.argwhere(spreads > 0.0)
+            pixels = pixels[np.argsort(-spreads[tuple(pixels.T)], kind="stable")][: limit - drawn]
+            if not len(pixels):
                 break
             if not number:
                 sums.append(read_floats(targets["bent"], 1, 4))
-            job.sample, pixels = _most(samples) + number, np.argwhere(found)
+            job.sample, drawn = _most(samples) + number, drawn + len(pixels)
             for first in range(0, len(pixels), most):
                 rows, columns = pixels[first : first + most].T
                 for whole, part in zip(sums, self._enlarged(job, columns, rows, run_passes), strict=True):
                     whole[rows, columns] = part + settled[rows, columns, None] * whole[rows, columns]
-            settled |= found
-        if settled.any():
+            settled[tuple(pixels.T)] = True
+        if drawn:
             for attachment, whole in zip(targets["bent"].color_attachments, sums, strict=True):
                 attachment.write(whole)
             # Who asks for what the last sample shows finds it.
@@ -343,9 +347,9 @@ def uneven_part(light: Floats, difference: float) -> Part:
     return bounds.wider(1, (level.shape[1], level.shape[0]))
 
 
-def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """(h, w): pixels of a picture (h, w) far off their neighbors, if these all are `inside` (h, w)."""
-    found, (height, width) = np.zeros(level.shape, bool), level.shape
+def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_]) -> Floats:
+    """(h, w): how many spreads pixels of a picture (h, w) are off, if all around are `inside` (h, w); else 0."""
+    found, (height, width) = np.zeros(level.shape, np.float32), level.shape
     steps = [(y, x) for y in range(-2, 3) for x in range(-2, 3) if (y, x) != (0, 0)]
     padded = np.pad(inside, 1)
     beside = [padded[1 + y : 1 + y + height, 1 + x : 1 + x + width] for y, x in steps if max(abs(y), abs(x)) == 1]
@@ -360,8 +364,9 @@ def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_]) -> npt.NDArray
     wide = np.array([np.where(inside[at], level[at], median) for at in around])
     spread = 1.4826 * np.median(np.abs(wide - np.median(wide, axis=0)), axis=0)
     distance = np.abs(own - median)
-    far = (distance > ISOLATED * np.maximum(spread, LEAST_SPREAD * np.abs(median))) & (off > ALONE * distance)
-    found[row[far], column[far]] = True
+    spread = np.maximum(spread, LEAST_SPREAD * np.abs(median))
+    far = (distance > ISOLATED * spread) & (off > ALONE * distance)
+    found[row[far], column[far]] = distance[far] / np.maximum(spread[far], 1e-12)
     return found
 
 
