@@ -73,9 +73,9 @@ class TransmittancePass:
         }
         program = self._variants.program(**switches, **paths)
         # Where there is no medium no path is read, and all of it is 0. So are sums: one program does for both where
-        # interfaces take most of the time.
+        # interfaces take most of the time, and not where none is in view.
         without = {name: False for name in paths if name != "SPECTRAL" or not job.compact}
-        one_program = features.has_surfaces and not job.plan.ordered
+        one_program = features.has_surfaces and not job.plan.ordered and job.covered
         empty = program if one_program else self._variants.program(**switches, **(paths | without))
         self._set_loose(job, (program, empty))
         self._variants.draw_covered(job, program, into, top_first=True)
