@@ -80,7 +80,8 @@ scene = tl.Scene([ball, floor], tl.Camera.look_at((0, 4, 6), (0, -1, 0), fov_y=4
 #: Requested interfaces: what the planner picks differs from version to version.
 _FRAMES = """
 renderer, bends = tl.Renderer(), any(body.has_interface for body in scene.objects)
-interfaces = tl.TracedInterfaces(depth=12, forks=2{hits}) if bends else None
+hits = dict({hits}) if "hits" in tl.TracedInterfaces.__dataclass_fields__ else dict()  # older ones have shaders alone
+interfaces = tl.TracedInterfaces(depth=12, forks=2, **hits) if bends else None
 def prepared():
     return lambda: renderer.render(scene, size, samples=1, interfaces=interfaces)
 """
@@ -130,7 +131,7 @@ scene = tl.showcase(tl.load_mesh("meshes/knot.ply"), tl.Medium.from_color((0.8, 
     "many": _MANY,
 }
 SCENES = {name: scene + _FRAMES.format(hits="") for name, scene in SCENES.items()}
-SCENES["gl"] = _GLASS.format(mesh="bear", target="center") + _FRAMES.format(hits=', hits="gl"')
+SCENES["gl"] = _GLASS.format(mesh="bear", target="center") + _FRAMES.format(hits='hits="gl"')
 SCENES |= {
     f"{name}{suffix}": _SOLVES.format(change=change, resolution=resolution)
     for name, change in _CHANGES.items()
