@@ -132,19 +132,22 @@ float entering_fraction(ObjectRow row, vec3 point, vec3 normal, vec3 irradiance)
     return min(dot(across, vec3(1.0)) / max(dot(irradiance, vec3(1.0)), 1e-30), 1.0);
 }
 
-// The same of light of the lights, through a wall without an interface. normal: outwards where the ray begins inside.
+// The same of light of the lights, through a wall whose far side is parallel. normal: outwards where the ray begins inside.
 vec3 ahead_from_lights(int object, vec3 far_end, vec3 normal, vec3 direction, vec3 optical_depth) {
     ObjectRow row = object_table_row(object);
     vec3 sum = vec3(0.0);
-    if (row.turned <= 0.0 || row.turned >= 1.0) { return sum; }
+    float g = row.ahead_cosine;
+    if (row.diffuses < 0.5 || g <= 0.0) { return sum; }
     float leaving = -dot(normal, direction);
     for (int light = 0; light < light_count; ++light) {
         LightSample arriving = light_at(light, far_end);
         float down = -dot(normal, arriving.towards);
         if (leaving <= 0.0 || down <= 0.0) { continue; }
-        vec3 depth = optical_depth * (leaving / down);
-        float g = 1.0 - row.turned;
-        vec3 part = scattered_ahead(depth, row.ahead, g, dot(direction, arriving.towards), staying_fraction(leaving, g)) / (4.0 * PI);
+        vec3 inside = refracted_direction(-arriving.towards, -normal, row.ior);
+        float within = max(dot(normal, inside), LEAST_ENTERING_COSINE);
+        arriving.irradiance *= (1.0 - fresnel_dielectric(down, row.ior)) * down / within;
+        vec3 depth = optical_depth * (leaving / within);
+        vec3 part = scattered_ahead(depth, row.ahead, g, -dot(direction, inside), staying_fraction(leaving, g)) / (4.0 * PI * row.ior * row.ior);
         if (max(part.r, max(part.g, part.b)) <= FAINTEST_HIGHLIGHT) { continue; }
         part *= entering_fraction(row, far_end, direction, arriving.irradiance);
         sum += part * irradiance_reaching(light, arriving, far_end, -normal);

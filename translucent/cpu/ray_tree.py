@@ -169,10 +169,10 @@ class DiffusionFields:
         return found
 
     def anisotropy(self, body: Integers) -> Array:
-        """(k,): g of bodies (k,) without an interface that scatter ahead, 0 of others."""
+        """(k,): g of bodies (k,) in which light diffuses and that scatter ahead, 0 of others."""
         found = np.zeros(len(body))
         for number, field in self._fields.items():
-            found[body == number] = 0.0 if field.travel is None else max(field.phase.mean_cosine, 0.0)
+            found[body == number] = max(field.phase.mean_cosine, 0.0)
         return found
 
     def irradiance_entering(self, body: Integers, points: Array, normals: Array) -> Array:
@@ -464,7 +464,7 @@ class _Growth:
             self._add(own, (through - passed) * ((1.0 - mirrored) * seen + mirrored * (far * behind + near * before)))
 
     def _add_ahead_from_lights(self, branches: Branches, length: Array, passed: Array) -> None:
-        """Add light of the lights that is scattered ahead in walls without an interface; length (n,) in metres."""
+        """Add light of the lights that is scattered ahead in walls of parallel sides; length (n,) in metres."""
         body = self.media.effective(branches.interior)
         anisotropy, leaving = self.tree.diffused.anisotropy(body), -dot(branches.outwards, branches.directions)
         walls = np.flatnonzero((anisotropy > 0.0) & (leaving > 0.0))
@@ -474,16 +474,20 @@ class _Growth:
         rays, ahead = self._rays(branches), self.tree.diffused.in_scattered(body[walls])[:, 0]
         ends = rays.origins + length[walls, None] * rays.directions
         depth = -np.log(np.maximum(passed[walls], np.finfo(np.float64).tiny))
-        found, eye = np.zeros(ends.shape), self.scene.camera.eye
+        found, eye, ior = np.zeros(ends.shape), self.scene.camera.eye, self.tree.diffused.ior(body[walls])
         entering = self.tree.diffused.irradiance_entering(body[walls], ends + eye, rays.directions)
         for light in self.tree.light.paths.lights:
             travel, _ = direction_and_distance(light, ends)
-            down, turn = dot(branches.outwards, travel), dot(branches.directions, -travel)
+            down = dot(branches.outwards, travel)
             lit = np.flatnonzero(down > 0.0)
-            along = depth[lit] * (leaving[lit] / down[lit])[:, None]
+            inside = refracted_direction(travel[lit], -branches.outwards[lit], ior[lit])
+            within, turn = dot(branches.outwards[lit], inside), -dot(branches.directions[lit], inside)
+            enters = (1.0 - optics.fresnel_dielectric(down[lit], ior[lit])) * down[lit] / within
+            along = depth[lit] * (leaving[lit] / within)[:, None]
             staying = staying_fraction(leaving, anisotropy)[lit, None]
-            part = scattered_ahead(along, ahead[lit], anisotropy[lit, None], turn[lit, None], staying) / (4.0 * np.pi)
-            arriving = light.irradiance_on(ends[lit], -travel[lit])
+            part = scattered_ahead(along, ahead[lit], anisotropy[lit, None], turn[:, None], staying)
+            part /= 4.0 * np.pi * ior[lit, None] ** 2
+            arriving = enters[:, None] * light.irradiance_on(ends[lit], -travel[lit])
             # None where the body itself is before the light.
             sums = entering[lit].sum(axis=1), np.maximum(arriving.sum(axis=1), np.finfo(np.float64).tiny)
             part *= np.minimum(sums[0] / sums[1], 1.0)[:, None]
