@@ -25,6 +25,7 @@ from translucent.gpu.placement import Part, extents, part_of
 from translucent.gpu.shaders import set_used
 from translucent.gpu.targets import SHADER_STORAGE
 from translucent.gpu.uniforms import media_center
+from translucent.planning.methods.base import FEW_SAMPLES as FEW_PIXELS
 from translucent.planning.passes import PassSpec
 from translucent.planning.rendered import Treatment, treatment_of
 from translucent.scene.grounds import Mirror, ground_of
@@ -98,8 +99,10 @@ class TracedInterfacesPass:
         gl.blend_equation = moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE
         mirror, by_generations = job.mirror, job.plan.hits == "embree"
-        # The program that adds the light of generations of rays shades the pixels without an interface, too.
-        shades_all = by_generations and bool(job.covered) and not (job.bending or job.bent_apart)
+        # The program that adds the light of generations of rays shades the pixels without an interface, too. So does the
+        # one that traces rays, in pictures that take less time than to compile another program.
+        shades_all = by_generations or job.targets.size[0] * job.targets.size[1] < FEW_PIXELS
+        shades_all = shades_all and bool(job.covered) and not (job.bending or job.bent_apart)
         by_depth = not (shades_all or any(interior_at_eye(job)))
         gl.enable_only(blending)
         if by_depth:
@@ -138,8 +141,9 @@ class TracedInterfacesPass:
             gl.enable_only(moderngl.BLEND | (moderngl.DEPTH_TEST if by_depth else moderngl.NOTHING))
         self._draw(job, job.covered.flipped(job.targets.size[1]), framebuffer, "unsettled", switches, values)
         if shades_all:
-            program = self._with_sums.program(**switches, GENERATIONS=True)
-            self._with_sums.draw_rest(job, program, framebuffer, top_first=True)
+            variants = self._with_sums if by_generations else self._variants
+            program = variants.program(**switches, GENERATIONS=by_generations)
+            variants.draw_rest(job, program, framebuffer, top_first=True)
         if mirror is not None and (part := mirrored_part(job, mirror)):
             values |= _mirroring(job.scene, mirror)
             if job.bending:
