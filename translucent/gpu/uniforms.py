@@ -274,7 +274,7 @@ def _medium(scene: Scene, body: Object, sheet: float | None) -> Fields:
         "phase": medium.phase_function.parameters,
         "stream_absorption": np.minimum(stream[0], limit),
         "stream_scattering": np.minimum(stream[1], limit),
-        "inner_mirror": diffuse_interface(medium.ior).reflected,
+        "inner_mirror": diffuse_interface(medium.ior).reflected if medium.scatters else 0.0,
         "scatters_much": treatment_of(body) is Treatment.LAYER,
         "longest": np.linalg.norm(body.bounds[1] - body.bounds[0]),
     }

@@ -215,6 +215,9 @@ def irradiance_map(source: EnvironmentMap) -> EnvironmentMap:
     Its lookups differ from the integral by a thousandth of the contrast, and within 1.4 degrees of a pole, where all
     that is known are the pixels around it, by a hundredth.
     """
+    color = source.pixels[0, 0]
+    if (source.pixels == color).all():  # which blurring leaves as it is
+        return EnvironmentMap(np.full((*IRRADIANCE_SIZE, 3), np.pi * color))
     pixels = sized(source, IRRADIANCE_SIZE)
     return EnvironmentMap(np.pi * convolved(pixels, lambda cosines: np.maximum(cosines, 0.0)))
 
