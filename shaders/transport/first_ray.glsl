@@ -1,5 +1,6 @@
 // The first ray of a pixel in the tree of traced interfaces: from the first interface, which the rasterizer has found, or from the
-// ground that mirrors it. Needs <constants>, <View>, <Surfaces> and ray_step.glsl. FROM_EYE, MIRROR.
+// ground that mirrors it. Needs <constants>, <View>, <Surfaces> and ray_step.glsl. FROM_EYE, MIRROR. PAINTED: what the rasterizer
+// finds there is not all in the table of objects.
 
 uniform sampler2D entered;             // interface towards the eye: normal, axial depth
 uniform sampler2D surface_parameters;  // of what is entered: object, roughness, transmission, variance of normals
@@ -54,10 +55,17 @@ bool has_interface(Pixel pixel) {
 // has it; variance: of normals.
 PrimaryHit primary_hit(Pixel pixel, out vec4 front, out float variance) {
     front = texelFetch(entered, pixel.texel, 0);
-    vec4 parameters = texelFetch(surface_parameters, pixel.texel, 0), tint = texelFetch(surface_color, pixel.texel, 0);
+    bool is_there = mirrored == 0 && front.w < NOTHING;
+    vec3 point = point_at(pixel.center, front.w);
+    vec4 parameters = texelFetch(surface_parameters, pixel.texel, 0);
     variance = parameters.w;
-    int object = mirrored == 0 && front.w < NOTHING ? int(parameters.x + 0.5) : AIR;
-    return PrimaryHit(object, point_at(pixel.center, front.w), front.xyz, parameters.y, parameters.z, tint.rgb, tint.a, pixel.number);
+#if ONE_OBJECT && !PAINTED
+    ObjectRow body = traced_body(0);
+    return PrimaryHit(is_there ? 0 : AIR, point, front.xyz, body.roughness, body.transmission, body.color, 1.0, pixel.number);
+#else
+    vec4 tint = texelFetch(surface_color, pixel.texel, 0);
+    return PrimaryHit(is_there ? int(parameters.x + 0.5) : AIR, point, front.xyz, parameters.y, parameters.z, tint.rgb, tint.a, pixel.number);
+#endif
 }
 
 // The first ray of a pixel, which starts a little before what the rasterizer has found; false where none does. reach: how far it

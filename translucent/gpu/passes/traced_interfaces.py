@@ -20,7 +20,7 @@ from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.interfaces import NoInterface
 from translucent.gpu.passes.opaque import bind_light, interface_shadow_switches
 from translucent.gpu.passes.ray_generations import Pixels, RayGenerations, all_words
-from translucent.gpu.passes.variants import Variants, background_switches, coat_switches
+from translucent.gpu.passes.variants import Variants, background_switches, coat_switches, look_switches
 from translucent.gpu.placement import Part, extents, part_of
 from translucent.gpu.shaders import set_used
 from translucent.gpu.targets import SHADER_STORAGE
@@ -99,8 +99,8 @@ class TracedInterfacesPass:
         gl.blend_equation = moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE
         mirror, by_generations = job.mirror, job.plan.hits == "embree"
-        # The program that adds the light of generations of rays shades the pixels without an interface, too. So does the
-        # one that traces rays, in pictures that take less time than to compile another program.
+        # The program that adds the light of generations of rays shades the pixels without an interface, too, and so does
+        # the one that traces rays in pictures that take less time than to compile another program.
         shades_all = by_generations or job.targets.size[0] * job.targets.size[1] < FEW_PIXELS
         shades_all = shades_all and bool(job.covered) and not (job.bending or job.bent_apart)
         by_depth = not (shades_all or any(interior_at_eye(job)))
@@ -250,6 +250,7 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
         "FROM_EYE": job.placed.starts_inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
         **ray_switches(job),
         "TEXTURED": job.features.textured,
+        "PAINTED": any(any(look_switches(body).values()) for body in scene.bodies),
         "EMISSION": _emission(job.features),
         "LAYERED": any(treatment_of(body) is Treatment.LAYER for body in scene.bodies),
         "DIFFUSED": diffused,
