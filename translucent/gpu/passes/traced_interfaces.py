@@ -99,8 +99,8 @@ class TracedInterfacesPass:
         gl.blend_equation = moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE
         mirror, by_generations = job.mirror, job.plan.hits == "embree"
-        # The program that adds the light of generations of rays shades the pixels without an interface, too, and so does
-        # the one that traces rays in pictures that take less time than to compile another program.
+        # The program that adds the light of generations of rays shades pixels without an interface, too.
+        # So does the one that traces rays, in pictures that take less time than to compile another program.
         shades_all = by_generations or job.targets.size[0] * job.targets.size[1] < FEW_PIXELS
         shades_all = shades_all and bool(job.covered) and not (job.bending or job.bent_apart)
         by_depth = not (shades_all or any(interior_at_eye(job)))
