@@ -130,11 +130,13 @@ def test_a_body_that_is_turned_turns_its_light() -> None:
     assert np.sqrt(((found[0] - found[0][::-1]) ** 2).mean()) > 0.3 * found[0].mean()
 
 
-@pytest.mark.parametrize(("name", "most"), [("uniform", 1e-4), ("from-above", 5e-4), ("studio", 0.045)])
+@pytest.mark.parametrize(("name", "most"), [("uniform", 1e-4), ("from-above", 5e-4), ("studio", 0.051)])
 def test_baked_light_is_that_of_pictures(name: str, most: float) -> None:
     """In uniform light and in a gradient, whose harmonics end, to what the solver leaves; in any other nearly.
 
-    The studio's windows have 9 % of their power above the second band. Measured: .042.
+    The studio's windows have 9 % of their power above the second band. The light of its 128 directions, solved for one
+    by one and added up, is .042 from the baked light, and .009 from that of pictures, which replace the directions by
+    two rays at each sample: together at most .051. Measured: .047.
     """
     (baked, alone), environment = jade(), environments()[name]
     true = exit_radiance(alone.field(environment), bear().vertices, vertex_normals(bear()))
