@@ -128,7 +128,7 @@ def test_a_lamp_in_the_middle_of_a_ball(absorption: float) -> None:
     k = math.sqrt(absorption / d)
     truth = float(of_shell(np.array([1e-6]), k, d, c)[0]) * 20.0 / (20.0 + absorption)
     # The lamp is in the middle of its cell, and the fluence is read somewhere in one: half a cell each.
-    place = math.exp(k * found.step) - 1
+    place = math.exp(k * found.placement.step) - 1
     surface = samples(found, body).mean(axis=0)
     np.testing.assert_allclose(surface, truth * np.array([1, 2, 4]), rtol=0.01 + 0.5 * place)
 
@@ -362,7 +362,7 @@ def test_size_does_not_matter() -> None:
         )
         light = tl.DirectionalLight((1, -2, -1), (1, 1, 1))
         ways.append(seen_field(body, light, environment=WHITE))
-    assert ways[1].step == pytest.approx(scale * ways[0].step)
+    assert ways[1].placement.step == pytest.approx(scale * ways[0].placement.step)
     # What rounding may change is where the solver stops.
     np.testing.assert_allclose(ways[1].fluence, ways[0].fluence, rtol=10 * TOLERANCE, atol=TOLERANCE)
     np.testing.assert_allclose(ways[1].entering, ways[0].entering, rtol=1e-5, atol=1e-6)
