@@ -53,12 +53,6 @@ _PLY = re.compile(
 )
 _PLY_TYPES = {b"float": "<f4", b"double": "<f8", b"ushort": "<u2", b"int": "<i4", b"uint": "<u4"}
 
-#: Text .obj files with nothing but the positions of vertices and then triangles.
-_OBJ = re.compile(
-    rb"(?:[#gos][^\\\n]*\n)*+((?:v [-+.\deE]+ [-+.\deE]+ [-+.\deE]+\n)++)"
-    rb"(?:[#gos][^\\\n]*\n)*+((?:f \d{1,9} \d{1,9} \d{1,9}\n)++)"
-)
-
 #: Suffixes of the native files of programs that can all export .glb.
 _SCENES_OF_PROGRAMS = (
     ".blend",
@@ -185,8 +179,8 @@ def read_triangles(path: Path, asked: str, allow_outside: bool = False) -> Trian
 
 
 def _parts(stream: BinaryIO, kind: str) -> list[Triangles]:
-    """Triangles of each part of a file. Plain .ply and .obj files need no trimesh, whose import takes long."""
-    if kind in _PLAINEST and (found := _PLAINEST[kind](stream)) is not None:
+    """Triangles of each part of a file. Plain .ply files need no trimesh, whose import takes long."""
+    if kind == "ply" and (found := _plain_ply(stream)) is not None:
         return [found]
     trimesh, loaders = import_trimesh(), import_trimesh("trimesh.exchange.load").mesh_loaders
     known = {"skip_materials": True} if kind in ("obj", "ply") else {}
@@ -217,28 +211,6 @@ def _plain_ply(stream: BinaryIO) -> Triangles | None:
     if (listed["corners"] != 3).any() or listed["vertices"].max(initial=0) >= vertices:
         return None
     return positions.astype(np.float64), listed["vertices"].astype(np.int32), None
-
-
-def _plain_obj(stream: BinaryIO) -> Triangles | None:
-    """Triangles of an .obj file that holds nothing else, of the vertices in use; None for any other file."""
-    match = _OBJ.fullmatch(stream.read())
-    stream.seek(0)
-    if match is None:
-        return None
-    try:
-        positions = np.fromstring(match[1].replace(b"v", b" "), sep=" ").reshape(-1, 3)
-    except ValueError:  # such as 1-2
-        return None
-    faces = np.fromstring(match[2].replace(b"f", b" "), dtype=np.int64, sep=" ").reshape(-1, 3) - 1
-    if len(positions) != match[1].count(b"v") or faces.min() < 0 or faces.max() >= len(positions):
-        return None
-    used = np.zeros(len(positions), dtype=bool)
-    used[faces] = True
-    return positions[used], (np.cumsum(used) - 1)[faces].astype(np.int32), None
-
-
-#: Readers of plain files, by format.
-_PLAINEST = {"obj": _plain_obj, "ply": _plain_ply}
 
 
 def _is_plain(content: dict[str, Any]) -> bool:

@@ -346,26 +346,3 @@ def test_a_plain_ply_is_read_without_trimesh(index: str, tmp_path: Path, monkeyp
     plain.write_bytes(header + corners.tobytes() + faces.tobytes())
     with pytest.raises(tl.InputError, match=r"plain\.ply'; .*trimesh is imported"):
         load_mesh(plain)
-
-
-def test_a_plain_obj_is_read_without_trimesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As trimesh reads it, without vertices that no face uses; files with anything else in them are left to trimesh."""
-    vertices = "v 0 0 0\nv -1.5e-1 7 7\nv 1 0 0\nv 0 .1 0\nv 0 0 +0.30000000000000004\n"
-    content = f"# a tetrahedron\no one\n{vertices}g all\nf 1 4 3\nf 1 3 5\nf 1 5 4\nf 3 4 5\n"
-    plain, other = tmp_path / "plain.obj", tmp_path / "other.obj"
-    plain.write_text(content)
-    other.write_text(content + "usemtl of_no_meaning\n")
-    by_trimesh = load_mesh(other)
-
-    def imported(module: str = "trimesh") -> None:
-        raise AssertionError(f"{module} is imported")
-
-    monkeypatch.setattr(mesh_files, "import_trimesh", imported)
-    mesh = load_mesh(plain)
-    np.testing.assert_array_equal(mesh.vertices, by_trimesh.vertices)
-    np.testing.assert_array_equal(mesh.faces, by_trimesh.faces)
-    assert mesh.diagnosis.solid
-    for old, new in (("5 4\n", "6 4\n"), ("f 1 4 3", "f 0 4 3"), ("f 1 4 3", "f 1 4 3 5"), ("v 0 0", "v 0 0-1")):
-        plain.write_text(content.replace(old, new, 1))
-        with pytest.raises(tl.InputError, match=r"plain\.obj'; .*trimesh is imported"):
-            load_mesh(plain)
