@@ -94,14 +94,20 @@ def test_what_a_ground_mirrors_is_that_of_all_samples(renderer: tl.Renderer, mon
     assert taken[0][taken[0] > 0].mean() < 13.0
 
 
-def test_a_ground_that_fills_the_picture_is_that_of_all_samples(renderer: tl.Renderer) -> None:
-    """Beyond the bodies it is drawn once, and counts as all samples."""
+def test_a_ground_that_fills_the_picture_is_that_of_all_samples(
+    renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beyond the bodies it is drawn once, and counts as all samples; no target has to be cleared there again."""
     above = tl.Camera.look_at((0.3, 6.0, 3.0), (0.0, -0.7, 0.0), fov_y=40.0)
     scene = dataclasses.replace(on_a_polished_ground(), camera=above)
     few, every = (renderer.render(scene, SIZE, samples=16, adaptive=adaptive) for adaptive in (True, False))
     off = np.abs(few.radiance / every.radiance - 1.0)[~every.coverage]
     assert np.quantile(off, 0.9) < 1e-3  # but in the mirror image of the ball
     np.testing.assert_allclose(few.transmittance, every.transmittance, rtol=1e-6)
+    monkeypatch.setattr(FrameJob, "rest_is_clear", property(lambda job: False, lambda job, value: None))
+    cleared = renderer.render(scene, SIZE, samples=16)
+    for name in ("radiance", "transmittance", "normals"):
+        np.testing.assert_array_equal(few.arrays[name], cleared.arrays[name], err_msg=name)
 
 
 def _without_a_coat(ground: tl.Object) -> tl.Object:

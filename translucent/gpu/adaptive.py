@@ -195,6 +195,7 @@ class AdaptiveSampling:
     def _enlarged(self, job: FrameJob, columns: Ints, rows: Ints, run_passes: Run) -> list[Floats]:
         """Sums (n, 4) of the light of the parts of some pixels, and of its square, as `bent` has them."""
         entered, bent, height = job.targets["entered"], job.targets["bent"], job.targets.size[1]
+        covered = job.covered
         marks = np.zeros((height, job.targets.size[0]), np.float32)
         blocks = [Part(left, top, left + PIXEL_PARTS, top + PIXEL_PARTS) for top, left in _corners(len(rows))]
         job.enlarged = list(zip(columns.tolist(), rows.tolist(), strict=True))
@@ -216,7 +217,7 @@ class AdaptiveSampling:
         for attachment in bent.color_attachments:
             attachment.write(np.zeros((drawn.top, drawn.right, 4), np.float32), viewport=drawn.scissor)
         run_passes(_all_but(job, PassName.TRACED))
-        job.enlarged = None
+        job.enlarged, job.covered = None, covered
         found = (bent.read(drawn.scissor, 4, attachment=number, dtype="f4") for number in range(2))
         shape = drawn.top // PIXEL_PARTS, PIXEL_PARTS, drawn.right // PIXEL_PARTS, PIXEL_PARTS, 4
         return [

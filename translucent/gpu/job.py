@@ -275,6 +275,8 @@ class FrameJob(CameraView):
         That mean is there.
     shows_ground_alone : bool
         Wherever no medium covers the picture it shows that mean, in all samples. What is covered is the same for these.
+    rest_is_clear : bool
+        Of such a job: the targets of interfaces show none beyond what is covered.
     has_blurs : bool
         That mean has its blurred levels.
     any_eye : bool
@@ -288,7 +290,7 @@ class FrameJob(CameraView):
 
     corner: tuple[int, int] = (0, 0)
     for_map = path_only = two_media = projected_depth = bent_apart = bending = any_eye = False
-    few_opaque = holds_opaque = has_blurs = shows_ground_alone = False
+    few_opaque = holds_opaque = has_blurs = shows_ground_alone = rest_is_clear = False
     uneven: Part | None = None
     enlarged: list[tuple[int, int]] | None = None
     photon_light: tuple[moderngl.Texture, int, tuple[int, int]] | None = None

@@ -35,11 +35,13 @@ class InterfacesPass:
         thin = job.features.sheets
         sheets = tuple(i for i in spec.objects if i in thin)
         solids = tuple(i for i in spec.objects if i not in thin)
+        # In one sample after another, only what is covered changes; single pixels are drawn anywhere.
+        cleared = job.covered.scissor if job.rest_is_clear and job.averaging and job.enlarged is None else None
         starts_inside = job.placed.starts_inside or any(picture_cuts(job.scene, job.scene.objects[i]) for i in solids)
         for back in (False,) if job.features.one_interface else (False, True):
             framebuffer = job.targets["left"] if back else job.targets["entered"]
             framebuffer.use()
-            framebuffer.clear(0.0, 0.0, 0.0, nothing, depth=1.0)
+            framebuffer.clear(0.0, 0.0, 0.0, nothing, depth=1.0, viewport=cleared)
             job.gl.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
             job.gl.depth_func = "<="
             job.gl.cull_face = "front" if back else "back"
@@ -55,6 +57,7 @@ class InterfacesPass:
             if not back:
                 job.gl.enable_only(moderngl.DEPTH_TEST)
                 self._draw(job, switches, sheets)
+        job.rest_is_clear = job.shows_ground_alone and job.enlarged is None
         job.gl.cull_face = "back"
         job.gl.depth_func = "<"
 

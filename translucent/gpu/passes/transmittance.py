@@ -79,7 +79,8 @@ class TransmittancePass:
         empty = program if one_program else self._variants.program(**switches, **(paths | without))
         self._set_loose(job, (program, empty))
         self._variants.draw_covered(job, program, into, top_first=True)
-        self._variants.draw_rest(job, empty, into, top_first=True)
+        if sums or not (job.averaging and job.shows_ground_alone and job.sample):  # else it is there, as in all samples
+            self._variants.draw_rest(job, empty, into, top_first=True)
 
     def run_map(
         self, job: FrameJob, into: moderngl.Framebuffer, corner: tuple[int, int], ahead: tuple[float, float]

@@ -427,9 +427,15 @@ class RecordedFramebuffer(_Recorded):
         return None if tuple(self.viewport) == self._whole else tuple(self.viewport)
 
     def clear(
-        self, red: float = 0.0, green: float = 0.0, blue: float = 0.0, alpha: float = 0.0, depth: float = 1.0
+        self,
+        red: float = 0.0,
+        green: float = 0.0,
+        blue: float = 0.0,
+        alpha: float = 0.0,
+        depth: float = 1.0,
+        viewport: None = None,
     ) -> None:
-        """Record a clear."""
+        """Record a clear of all of it."""
         self._gl.note_clear(self, (red, green, blue, alpha), depth)
 
     def read(self, viewport: Any = None, components: int = 4, **_: Any) -> bytes:
