@@ -298,11 +298,11 @@ void interact_opaque(inout Path path, SurfaceHit surface, ObjectRow body, vec3 p
     arriving.disc = vec4(0.0);  // it comes from one point of it
     float cos_light = dot(normal, arriving.towards);
     if (cos_light * dot(surface.face_normal, arriving.towards) > 0.0) {
-        vec3 value = cos_light > 0.0 ? opaque_value(bsdf, normal, -path.direction, arriving, cos_view, cos_light)
-            : (1.0 - bsdf.coated) * bsdf.passed / PI;
+        vec3 value = cos_light > 0.0 ? opaque_value(bsdf, normal, path.direction, arriving, cos_view, cos_light)
+            : (1.0 - bsdf.coated) * bsdf.passed / PI * -cos_light;
         float skipped;
         vec3 origin = origin_beside(point, surface.face_normal, arriving.towards, skipped);
-        vec3 weight = path.throughput * value * abs(cos_light) * arriving.irradiance * float(light_count);
+        vec3 weight = path.throughput * value * arriving.irradiance * float(light_count);
         lit = LightRay(origin, skipped, path.interior, arriving.towards, arriving.distance_m - skipped, weight);
     }
 #endif

@@ -1,7 +1,7 @@
 // Directions of random paths at opaque surfaces: of one lobe of the bsdf, chosen by chance. Needs shade/opaque_light.glsl and random.glsl.
 
-// Direction in which microfacets reflect, drawn among the visible ones (Heitz 2018); away: as in facets_value; returns the fraction
-// that others do not mask.
+// Direction in which microfacets reflect, drawn among the visible ones (Heitz 2018); away: (1 - cos)^5 of the angle to the facet;
+// returns the fraction that others do not mask.
 float sampled_facet(vec3 normal, float alpha, float cos_view, vec2 numbers, inout vec3 direction, out float away) {
     vec3 facet = microfacet_normal(normal, direction, alpha, numbers);
     away = pow(1.0 - clamp(-dot(facet, direction), 0.0, 1.0), 5.0);
