@@ -109,7 +109,7 @@ LOOSE = {"frag": 14, "vert": 15}
 FIRST_TEXTURE = {"frag": 16, "vert": 64}
 
 _TEXTURE = re.compile(r"^uniform ([iu]?)sampler(\w+) (\w+);", re.MULTILINE)
-_UNIFORM = re.compile(r"^uniform (\w+ \w+(?:\[\w+\])?;.*)$", re.MULTILINE)
+_UNIFORM = re.compile(r"^uniform (\w+ \w+(?:\[[\w *]+\])?;.*)$", re.MULTILINE)
 _VARYING = re.compile(r"^(flat )?(in|out) (\w+) (\w+);", re.MULTILINE)
 _FETCH = r"\b(?:texelFetch|textureSize)\(\s*"
 
