@@ -15,7 +15,8 @@ float packed_variance(vec3 variance) {
     float larger = clamp((log2(middle + off) / LEAST_PACKED + 1.0) * 255.0, 1.0, 255.0);
     float ratio = sqrt(clamp((middle - off) / (middle + off), 0.0, 1.0)) * 255.0;
     float angle = off > 0.0 ? fract(0.5 * atan(variance.y, aside) / PI) * 256.0 : 0.0;
-    return dot(floor(vec3(larger, ratio, angle) + 0.5), vec3(65536.0, 256.0, 1.0));
+    // An angle that rounds to half a turn is that of none: carried over, it would turn a round average into a line.
+    return dot(vec3(floor(vec2(larger, ratio) + 0.5), mod(floor(angle + 0.5), 256.0)), vec3(65536.0, 256.0, 1.0));
 }
 
 vec3 unpacked_variance(float stored) {
