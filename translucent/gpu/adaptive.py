@@ -188,7 +188,7 @@ class AdaptiveSampling:
         if drawn:
             for attachment, whole in zip(targets["bent"].color_attachments, sums, strict=True):
                 attachment.write(whole)
-            # Who asks for what the last sample shows finds it.
+            # Blocks have replaced what the last sample shows, which a frame reads: it is drawn again.
             job.place(shown)
             run_passes(_all_but(job, PassName.INTERFACES))
 
