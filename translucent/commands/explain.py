@@ -59,7 +59,8 @@ class ExplainOptions:
 def explain(model: str, given: ExplainOptions, as_json: bool) -> None:
     """Print facts about MODEL, and the plan to render MODEL.
 
-    The plan lists the passes of the renderer, each with its reason, and the approximations.
+    The plan lists the passes of the renderer, each with its reason, and the approximations. It is a plan for any
+    picture: by its size, its samples and the OpenGL driver, render may add caustics, and let Embree find the hits.
 
     A .glb or .gltf file keeps its camera, lights and media. Several models, each with its material: goblet:crystal
     wine:red_wine.
