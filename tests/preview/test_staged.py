@@ -21,7 +21,7 @@ from translucent.preview import quality
 from translucent.preview.actions import ChoosePreset, OrbitBy, SetField
 from translucent.preview.document import AUTO, Document, Look, Model, framed, orbit_of
 from translucent.preview.exports import Recipe, command_line, python_code
-from translucent.preview.scenes import stage_name, tone_of
+from translucent.preview.scenes import request_of, stage_name, tone_of
 from translucent.preview.session import Preferences, load_session, save_session
 from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
@@ -115,6 +115,10 @@ def test_auto_is_what_render_takes(staged: Workspace) -> None:
 
 
 def test_the_picture_is_the_one_that_render_makes(staged: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the shadow maps of a window: those of large pictures, so that they stay when it grows or the eye comes near.
+
+    Render chooses the same ones for a picture of a usual window, and smaller ones only where less can be seen.
+    """
     monkeypatch.setattr(quality, "STRIDES", (1, 1, 1))  # parts of a picture see the ground's texture more blurred
     view = ViewportRenderer()
     staged.do(SetField("display.antialias", False))
@@ -122,7 +126,10 @@ def test_the_picture_is_the_one_that_render_makes(staged: Workspace, monkeypatch
     scene = staged.scene()
     assert scene is not None
     with view.current():
-        frame = view.renderer.render(scene, SIZE)
+        frame = view.renderer.render(scene, SIZE, shadows=tl.ShadowMaps())
+        large = view.renderer.plan_requested(scene, dataclasses.replace(request_of(staged.document), pixels=960 * 720))
+    assert view.plans[0] is not None
+    assert view.plans[0].shadows == large.shadows == tl.ShadowMaps()
     assert np.abs(pixels(view) - frame.to_srgb8(0.0, "neutral").astype(int)).max() <= 1
     staged.do(OrbitBy(20.0, 0.0))
     view.draw(staged, SIZE)
@@ -137,6 +144,7 @@ def test_the_picture_is_the_one_that_render_makes(staged: Workspace, monkeypatch
 
 
 def test_maps_that_take_several_frames_are_those_of_one(staged: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And maps that are drawn four at once are those that are drawn all at once. Every fourth request ends a frame."""
     scene, asked = plain(staged), 0
     with tl.Renderer() as renderer:
         expected = renderer.render(scene, SMALL).radiance
@@ -148,6 +156,7 @@ def test_maps_that_take_several_frames_are_those_of_one(staged: Workspace, monke
             raise PostponedError(None)
 
     monkeypatch.setattr(shadow_maps, "before_making", impatient)
+    monkeypatch.setattr(shadow_maps, "_AT_ONCE", 4)
     with tl.Renderer() as renderer:
         for _ in range(10):
             try:
@@ -155,8 +164,9 @@ def test_maps_that_take_several_frames_are_those_of_one(staged: Workspace, monke
                 break
             except PostponedError:
                 continue
-    seen, drawn = 1 + scene.environment_shadows, 1 + 11  # by a light and all directions; maps of those above the ground
-    assert asked == seen + drawn + 8, "once for what each sees and for each map, and 8 frames that ended early"
+    # By a light and all directions; the light's map, and those of 11 directions above the ground in three portions.
+    seen, drawn = 1 + scene.environment_shadows, 1 + 3
+    assert asked == seen + drawn + 6, "once for what each sees and for each portion, and 6 frames that ended early"
     np.testing.assert_array_equal(found, expected)
 
 
@@ -287,19 +297,21 @@ def test_quick_shadows_need_no_more_maps_than_they_read(staged: Workspace, monke
 
     One of the four directions of quick shadows is below the ground, and has no map.
     """
-    scene, quick, made = plain(staged), tl.ShadowMaps(directions=4), []
+    scene, every, quick, made = plain(staged), tl.ShadowMaps(), tl.ShadowMaps(directions=4), []
     add_up = shadow_maps.ShadowMapsPass._add_up
-    monkeypatch.setattr(shadow_maps.ShadowMapsPass, "_add_up", lambda *given: made.append(1) or add_up(*given))
+    monkeypatch.setattr(
+        shadow_maps.ShadowMapsPass, "_add_up", lambda it, job: made.extend(job._views) or add_up(it, job)
+    )
     turned = dataclasses.replace(scene, environment=dataclasses.replace(scene.environment, rotation=70.0))
     with tl.Renderer() as renderer:
         pictures = []
         for shown, shadows, count in (
             (scene, quick, 3),
             (scene, quick, 0),
-            (scene, None, 11),
+            (scene, every, 11),
             (scene, quick, 0),
             (turned, quick, 3),
-            (turned, None, 11),
+            (turned, every, 11),
         ):
             made.clear()
             pictures.append(renderer.render(shown, SMALL, shadows=shadows).radiance)

@@ -75,7 +75,8 @@ class ShadowMaps:
 def usual_maps(scene: Scene, pixels: int) -> tuple[ShadowMaps, tuple[Note, ...]]:
     """Default shadow maps of a picture of so many pixels, with a note if rays that cross many surfaces narrow them.
 
-    They are no finer than a small picture can show; 0 are pixels that are not known.
+    They are no finer than a small picture can show. 0 are pixels that are not known, as those of a window: its maps
+    stay when it grows or the eye comes near.
 
     Of all lines through a box of area S, surfaces in it of area A are crossed 2 A / S times on average (Cauchy 1850).
     """
