@@ -15,6 +15,7 @@ from translucent.geometry.solids import Box, Sphere
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import TextureBackdrop
 from translucent.gpu.placement import AxialRange
+from translucent.planning.request import RenderRequest
 
 Array = npt.NDArray[Any]
 
@@ -50,8 +51,10 @@ def bodies_of(scene: tl.Scene) -> tl.Scene:
 
 def opaque_picture(renderer: tl.Renderer, scene: tl.Scene, method: Any = None) -> tuple[Array, Array]:
     """Radiance, and metres along the forward axis, of what the pass of opaque objects draws."""
+    # As `render` plans it: the size of shadow maps follows from the pixels of a picture.
+    request = RenderRequest(method, pixels=SIZE[0] * SIZE[1])
     with renderer.gpu.context.current():
-        job = renderer.gpu.prepare(renderer.plan(scene, method), SIZE)
+        job = renderer.gpu.prepare(renderer.plan_requested(scene, request), SIZE)
         renderer.gpu.run(job)
         target = job.targets["opaque"]
         axial_depth, radiance = (

@@ -416,6 +416,8 @@ def test_shadow_maps_are_as_fine_as_the_picture_can_show() -> None:
     assert sizes == [1024, 256, 512, 1024]
     part = replace(seen, camera=replace(camera, window=Window(0, 0, (800, 800))))
     assert plan_scene(part, RenderRequest(pixels=64 * 64)).shadows.size == 1024
+    # What is in a backdrop may be nearer to the eye than all bodies.
+    assert plan_over_backdrop(replace(seen, objects=[body()]), pixels=64 * 64).shadows == tl.ShadowMaps()
 
 
 def test_shadows_on_a_backdrop_are_as_requested() -> None:

@@ -519,7 +519,8 @@ def _with_shadows(found: RenderPlan, scene: Scene, machine: Capabilities) -> Ren
         return found
     shadows, narrow = found.request.shadows, tuple[Note, ...]()
     if shadows is None and before:
-        shadows, narrow = usual_maps(scene, found.request.pixels)
+        # What a backdrop shows may be nearer to the eye than the bodies: nobody knows how fine shadows look there.
+        shadows, narrow = usual_maps(scene, 0 if found.request.over_backdrop else found.request.pixels)
     return replace(
         found,
         passes=(*before, *behind, *found.passes),

@@ -43,7 +43,7 @@ class ShadowMaps:
     size : int
         Texels along a side of each light's map, 64 to 8192. Those of directions of the environment
         (`Scene.environment_shadows`) have a quarter of it. Without any choice of shadows, small pictures have maps as
-        fine as they can show.
+        fine as they can show, except over a backdrop.
     directions : int, optional
         Of the environment, that a pixel looks into at most: for pictures that move. Shadows are the rougher for it,
         and as bright. None: all.
@@ -76,7 +76,7 @@ def usual_maps(scene: Scene, pixels: int) -> tuple[ShadowMaps, tuple[Note, ...]]
     """Default shadow maps of a picture of so many pixels, with a note if rays that cross many surfaces narrow them.
 
     They are no finer than a small picture can show. 0 are pixels that are not known, as those of a window: its maps
-    stay when it grows or the eye comes near.
+    stay when it grows or the eye comes near; and those over a backdrop, whose nearest shadow nobody knows.
 
     Of all lines through a box of area S, surfaces in it of area A are crossed 2 A / S times on average (Cauchy 1850).
     """
