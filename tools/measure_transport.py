@@ -101,7 +101,7 @@ def errors(radiance: Array, a: Array, b: Array, mask: Array) -> str:
 
 
 def deviations(frame: tl.Frame, a: Array, b: Array, mask: Array) -> str:
-    """How far random paths are off in standard errors, their own and those of the truth, as a line of text."""
+    """Line of text: error of random paths in standard errors, which combine those of the paths and of the truth."""
     assert frame.standard_error is not None
     off = frame.radiance.astype(np.float64) - 0.5 * (a + b)
     # The variance of a pixel of the truth is that of two numbers: it is averaged with its neighbors.

@@ -6,8 +6,8 @@ uniform sampler2D entered;             // interface towards the eye: normal, axi
 uniform sampler2D surface_parameters;  // of what is entered: object, roughness, transmission, variance of normals
 uniform sampler2D surface_color;
 
-uniform int enlarges;  // 1: parts of some pixels are drawn, each of which fills a block of pixels
-uniform vec2 enlarged_pixels[ENLARGED_ACROSS * ENLARGED_ACROSS];  // columns and rows of these, in the order of the blocks
+uniform int enlarges;  // 1: the picture shows some pixels enlarged, each as a block of pixels
+uniform vec2 enlarged_pixels[ENLARGED_ACROSS * ENLARGED_ACROSS];  // columns and rows of these pixels, in the order of their blocks
 
 // A pixel of the frame that is drawn.
 struct Pixel {

@@ -53,7 +53,7 @@ void main() {
     float own_level = luminance(own_light.rgb) / taken, own_variance = 0.0, bends = 0.0, lowest = 1e30, highest = -1e30;
     float local = 0.0, weights = 0.0, count = 0.0, variances = 0.0, squares = 0.0;
     vec3 slopes = vec3(0.0);  // of the levels of these pixels: mean, to the right, down
-    // Software rasterizers skip loops, and no branches.
+    // A loop with no turns is skipped by software rasterizers; the body of a branch is not.
     for (int y = complete || needs_all ? 2 : -1; y <= 1; ++y) {
         for (int x = -1; x <= 1; ++x) {
             ivec2 at = clamp(here + ivec2(x, y), ivec2(0), last);

@@ -144,7 +144,7 @@ def test_the_picture_is_the_one_that_render_makes(staged: Workspace, monkeypatch
 
 
 def test_maps_that_take_several_frames_are_those_of_one(staged: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And maps that are drawn four at once are those that are drawn all at once. Every fourth request ends a frame."""
+    """Shadow maps drawn four at once equal maps drawn all at once. Every fourth request ends a frame."""
     scene, asked = plain(staged), 0
     with tl.Renderer() as renderer:
         expected = renderer.render(scene, SMALL).radiance

@@ -175,7 +175,7 @@ def side_weights(normals: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class GridPlacement:
-    """Where in the world the cells of a body are.
+    """Position, axes and cell size of a grid in the world.
 
     Attributes
     ----------

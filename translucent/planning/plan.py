@@ -70,7 +70,7 @@ from translucent.planning.methods import (
     SignedDepth,
     ThinLayer,
 )
-from translucent.planning.methods.base import EMBREE_COST, FEW_SAMPLES, HITS, chosen_hits
+from translucent.planning.methods.base import EMBREE_COST, HITS, SMALL_PICTURE, chosen_hits
 from translucent.planning.methods.path_traced import has_bases, takes_picture
 from translucent.planning.methods.ray_marched import MAX_STEPS
 from translucent.planning.passes import Note, NoteKind, PassName, PassSpec
@@ -277,7 +277,7 @@ def _thickness(scene: Scene, request: RenderRequest, machine: Capabilities, *, a
 
 def _has_few_rays(request: RenderRequest, machine: Capabilities) -> bool:
     """True if preparing Embree and its shaders takes longer than Embree saves in a picture."""
-    return machine.software and 0 < request.pixels * request.samples < FEW_SAMPLES and request.caustics is None
+    return machine.software and 0 < request.pixels * request.samples < SMALL_PICTURE and request.caustics is None
 
 
 def _method(

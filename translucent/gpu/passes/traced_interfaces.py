@@ -25,7 +25,7 @@ from translucent.gpu.placement import Part, extents, part_of
 from translucent.gpu.shaders import set_used
 from translucent.gpu.targets import SHADER_STORAGE
 from translucent.gpu.uniforms import media_center
-from translucent.planning.methods.base import FEW_SAMPLES as FEW_PIXELS
+from translucent.planning.methods.base import SMALL_PICTURE
 from translucent.planning.passes import PassSpec
 from translucent.planning.rendered import Treatment, treatment_of
 from translucent.scene.grounds import Mirror, ground_of
@@ -101,7 +101,7 @@ class TracedInterfacesPass:
         mirror, by_generations = job.mirror, job.plan.hits == "embree"
         # The program that adds the light of generations of rays shades pixels without an interface, too.
         # So does the one that traces rays, in pictures that take less time than to compile another program.
-        shades_all = by_generations or job.targets.size[0] * job.targets.size[1] < FEW_PIXELS
+        shades_all = by_generations or job.targets.size[0] * job.targets.size[1] < SMALL_PICTURE
         shades_all = shades_all and bool(job.covered) and not (job.bending or job.bent_apart)
         by_depth = not (shades_all or any(interior_at_eye(job)))
         gl.enable_only(blending)

@@ -139,7 +139,7 @@ EMBREE_COST = 0.5
 
 #: Samples of a whole picture below which OpenGL finds the hits on processors, too: a bear of 64 x 64 pixels takes .05 s
 #: less, and .2 s less where no shader is in the driver's cache; with 16000 samples Embree is as fast.
-FEW_SAMPLES = 8192
+SMALL_PICTURE = 8192
 
 
 def check_hits(what: str, hits: str | None) -> None:
