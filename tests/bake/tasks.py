@@ -24,7 +24,7 @@ def sleep_long(number: int) -> int:
 
 def tell_and_hold(item: int) -> int:
     """Print the process's id, and let no other thread of it run for a minute, as some C libraries do."""
-    print(os.getpid(), flush=True)
+    os.write(1, f"{os.getpid()}\n".encode())  # in one piece, as the processes share the pipe
     if sys.platform == "linux":  # elsewhere only a thread sees that the parent is gone
         ctypes.PyDLL(None).sleep(60)
     time.sleep(60.0)
