@@ -31,7 +31,7 @@ from translucent.renderer import Renderer
 from translucent.scene.camera import Window, check_size
 from translucent.scene.scene import Scene
 
-#: Width and height of a tile, unless told otherwise.
+#: Width and height of a tile, unless another is requested.
 TILE = (2048, 512)
 
 #: Pixels around a tile that are drawn, too, where interfaces show what the picture has of opaque objects beside it.
@@ -125,7 +125,7 @@ def tiles_requested(
     across, down = check_size(tile)
     windows = [(x, y) for y in range(0, height, down) for x in range(0, width, across)]
     covered = invalid = 0
-    told: set[str] = set()
+    warned: set[str] = set()
     for number, (left, top) in enumerate(windows):
         extent = min(across, width - left), min(down, height - top)
         share = _part(progress, number, len(windows))
@@ -135,8 +135,8 @@ def tiles_requested(
         covered += int(np.count_nonzero(frame.coverage))
         invalid += int(np.count_nonzero(~frame.valid))
         for one in caught:
-            if "pixels are not valid" not in str(one.message) and str(one.message) not in told:
-                told.add(str(one.message))
+            if "pixels are not valid" not in str(one.message) and str(one.message) not in warned:
+                warned.add(str(one.message))
                 warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
         yield Tile(left, top, frame)
     if progress is not None:

@@ -52,8 +52,8 @@ def scores(results: list[Results]) -> list[str]:
         best = min(value for value in known if value is not None)
         cells = []
         for one, value in zip(results, known, strict=True):
-            told = one["scenes"].get(scene.name, {})
-            ratio = told["seconds"] / told["floor"] if told.get("seconds") and told.get("floor") else None
+            result = one["scenes"].get(scene.name, {})
+            ratio = result["seconds"] / result["floor"] if result.get("seconds") and result.get("floor") else None
             text = f"**{number(value)}**" if value == best else number(value)
             cells.append(
                 f"{text} ({number(ratio) if ratio and ratio < 10 else f'{ratio:.0f}'})" if ratio and text else text

@@ -182,8 +182,8 @@ def _ours(name: str, title: str, settings: str, features: frozenset[Feature] = A
                 thickness = np.where(frame.valid, frame.thickness, np.nan) if scene.thickness else None
                 return Rendered(radiance, seconds, thickness)
 
-            told = renderer.provenance
-            yield Session(draw, VERSION, f"{told['renderer']}, {told['driver']}")
+            provenance = renderer.provenance
+            yield Session(draw, VERSION, f"{provenance['renderer']}, {provenance['driver']}")
 
     return Adapter(name, title, settings, features, lambda: "", start)
 
@@ -272,11 +272,11 @@ def _blender(engine: str, samples: int, title: str, settings: str, features: fro
                 picture = folder / "picture.exr"
                 process.stdin.write(json.dumps({"folder": str(folder), "picture": str(picture)}) + "\n")
                 process.stdin.flush()
-                told = answer()
-                if "error" in told:
-                    raise RenderError(f"Blender's {engine}", told["error"], "read the script of this adapter")
+                reply = answer()
+                if "error" in reply:
+                    raise RenderError(f"Blender's {engine}", reply["error"], "read the script of this adapter")
                 _, channels = read_exr(picture, "the picture")
-                return Rendered(np.stack([channels[name] for name in "RGB"], axis=-1), told["seconds"])
+                return Rendered(np.stack([channels[name] for name in "RGB"], axis=-1), reply["seconds"])
 
             yield Session(
                 draw, answer()["version"], f"CPU, {os.cpu_count()} threads" if engine == "cycles" else "OpenGL"

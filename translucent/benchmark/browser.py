@@ -77,8 +77,8 @@ class WebRenderer:
 
     def version(self) -> str:
         """Version of the renderer's first npm package."""
-        told = npm_folder() / "node_modules" / self.npm()[0] / "package.json"
-        return str(json.loads(told.read_text(encoding="utf-8"))["version"])
+        package = npm_folder() / "node_modules" / self.npm()[0] / "package.json"
+        return str(json.loads(package.read_text(encoding="utf-8"))["version"])
 
 
 def chromium() -> str | None:
@@ -105,17 +105,17 @@ class WebSession:
         self._errors.clear()
         width, height = scene.size
         try:
-            told = self._page.evaluate("(order) => window.drawScene(order)", {"home": _HOME + "scene/", "size": width})
+            drawn = self._page.evaluate("(order) => window.drawScene(order)", {"home": _HOME + "scene/", "size": width})
         except Exception as error:
             said = "; ".join([*self._errors[:2], str(error).splitlines()[0]])
             raise RenderError(
                 f"drawing {scene.name!r} in a browser", said, "look for the error in translucent/benchmark/peers"
             ) from error
-        values = np.frombuffer(base64.b64decode(told["pixels"]), np.float32)
+        values = np.frombuffer(base64.b64decode(drawn["pixels"]), np.float32)
         side = round((values.size / 3) ** 0.5)
         fine = values.reshape(side, side, 3)
         parts = side // width
-        return fine.reshape(height, parts, width, parts, 3).mean(axis=(1, 3)), told["seconds"]
+        return fine.reshape(height, parts, width, parts, 3).mean(axis=(1, 3)), drawn["seconds"]
 
 
 @contextmanager

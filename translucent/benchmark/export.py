@@ -201,11 +201,11 @@ def _light(light: Any) -> Json:
 
 
 def _object(number: int, item: Object) -> Json:
-    told: Json = {"node": number, "name": item.mesh.name or f"object {number}"}
+    entry: Json = {"node": number, "name": item.mesh.name or f"object {number}"}
     if item.medium is None:
-        return told | {"type": "opaque", "diffuse_reflectance": np.asarray(item.base_color)[:3].tolist()}
+        return entry | {"type": "opaque", "diffuse_reflectance": np.asarray(item.base_color)[:3].tolist()}
     medium = item.medium
-    return told | {
+    return entry | {
         "type": "body" if item.sheet_thickness is None else "sheet",
         "sheet_thickness": item.sheet_thickness,
         "ior": medium.ior,
@@ -235,10 +235,15 @@ def glb_of(made: Scene) -> bytes:
 
     def add(values: npt.NDArray[np.float32], bounded: bool = False) -> int:
         at = view(values.astype("<f4").tobytes(), target=34962)
-        told: Json = {"bufferView": at, "componentType": 5126, "count": len(values), "type": f"VEC{values.shape[-1]}"}
+        accessor: Json = {
+            "bufferView": at,
+            "componentType": 5126,
+            "count": len(values),
+            "type": f"VEC{values.shape[-1]}",
+        }
         if bounded:
-            told |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
-        accessors.append(told)
+            accessor |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+        accessors.append(accessor)
         return len(accessors) - 1
 
     for item in made.objects:
@@ -311,17 +316,17 @@ def _gltf_light(light: Any) -> tuple[Json, list[float]]:
     """Light of KHR_lights_punctual, and its matrix by columns: it shines along -z."""
     strength = np.asarray(light.irradiance if isinstance(light, DirectionalLight) else light.intensity)
     brightest = float(strength.max()) or 1.0
-    told = {"color": (strength / brightest).tolist(), "intensity": brightest}
+    strengths = {"color": (strength / brightest).tolist(), "intensity": brightest}
     if isinstance(light, PointLight):
         place = np.eye(4)
         place[:3, 3] = light.position
-        return {"type": "point", **told}, place.T.ravel().tolist()
+        return {"type": "point", **strengths}, place.T.ravel().tolist()
     back = -np.asarray(light.direction)
     side = np.cross((0.0, 1.0, 0.0) if abs(back[1]) < 0.9 else (1.0, 0.0, 0.0), back)
     side /= np.linalg.norm(side)
     place = np.eye(4)
     place[:3, :3] = np.stack([side, np.cross(back, side), back], axis=1)
-    return {"type": "directional", **told}, place.T.ravel().tolist()
+    return {"type": "directional", **strengths}, place.T.ravel().tolist()
 
 
 # --- Mitsuba, which has no priorities --------------------------------------------------------------------------------

@@ -177,8 +177,8 @@ def read_results(folder: Path) -> Results:
     }
     texts["name"] = texts["name"] or _text(folder.resolve().name)
     scenes = found.get("scenes", {})
-    told = scenes if isinstance(scenes, dict) else {}
-    results = {name: _scene_result(told[name], path) for name in scene_names() if name in told}
+    entries = scenes if isinstance(scenes, dict) else {}
+    results = {name: _scene_result(entries[name], path) for name in scene_names() if name in entries}
     for name in scene_names():
         if name not in results and any(picture_path(folder, name, what) for what in ("", ".thickness")):
             results[name] = SceneResult()
@@ -200,30 +200,30 @@ def _time(value: Any) -> float | None:
     return number if 0.0 < number < 1e7 else None
 
 
-def _scene_result(told: Any, path: Path) -> SceneResult:
-    if not isinstance(told, dict):
+def _scene_result(entry: Any, path: Path) -> SceneResult:
+    if not isinstance(entry, dict):
         raise InputError(
             f"results {str(path)!r}",
             "an entry of a scene is not a JSON object",
             "the documentation describes the contents of this file",
         )
-    texts = {key: _text(told.get(key, "")) for key in ("lacking", "failure")}
-    score = told.get("score")
+    texts = {key: _text(entry.get(key, "")) for key in ("lacking", "failure")}
+    score = entry.get("score")
     return SceneResult(
-        _time(told.get("seconds")),
-        _time(told.get("floor")),
+        _time(entry.get("seconds")),
+        _time(entry.get("floor")),
         **texts,
         score=_score(score) if isinstance(score, dict) else None,
     )
 
 
-def _score(told: Mapping[str, Any]) -> Score:
-    numbers = {key: _number(told.get(key)) for key in ("nrmse", "block", "flip", "visible", "own_flip", "own_visible")}
-    bias = told.get("bias")
+def _score(entry: Mapping[str, Any]) -> Score:
+    numbers = {key: _number(entry.get(key)) for key in ("nrmse", "block", "flip", "visible", "own_flip", "own_visible")}
+    bias = entry.get("bias")
     channels = [_number(one) for one in bias] if isinstance(bias, list) else []
     red, green, blue = channels if len(channels) == 3 else [math.nan] * 3
-    thick = told.get("thickness")
-    said = told.get("suspicions")
+    thick = entry.get("thickness")
+    said = entry.get("suspicions")
     return Score(
         **numbers,
         bias=(red, green, blue),

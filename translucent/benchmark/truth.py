@@ -76,18 +76,18 @@ class TruthPicture:
         channels["mask"] = self.mask.astype(np.float16)
         if self.thickness is not None:
             channels["thickness"] = self.thickness.astype(np.float32)
-        told = json.dumps({"parameters": self.parameters.tolist(), "paths": self.paths})
-        write_atomically(path, lambda part: write_exr(part, channels, {"translucent": told}))
+        record = json.dumps({"parameters": self.parameters.tolist(), "paths": self.paths})
+        write_atomically(path, lambda part: write_exr(part, channels, {"translucent": record}))
 
     @classmethod
     def read(cls, path: Path) -> TruthPicture:
         """Truth of a file; raises `InputError` where it is not one."""
         header, channels = read_exr(path, f"truth {path.stem!r}")
         halves = np.stack([np.stack([channels[f"{layer}.{c}"] for c in "RGB"], axis=-1) for layer in "ab"])
-        told = json.loads(header["translucent"])
+        record = json.loads(header["translucent"])
         thickness = channels.get("thickness")
-        parameters = np.array(told["parameters"])
-        return cls(halves.astype(np.float32), channels["mask"] > 0.5, thickness, parameters, int(told["paths"]))
+        parameters = np.array(record["parameters"])
+        return cls(halves.astype(np.float32), channels["mask"] > 0.5, thickness, parameters, int(record["paths"]))
 
 
 def truth_path(name: str) -> Path:

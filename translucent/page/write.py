@@ -68,10 +68,10 @@ window.translucent = (async () => {
     script.textContent = await new Response(stream).text();
     document.body.append(script);
   } catch (error) {
-    const told = document.createElement("p");
-    told.className = "failed";
-    told.textContent = `This page cannot show its scene: ${error.message}.`;
-    document.getElementById("viewer").append(told);
+    const failure = document.createElement("p");
+    failure.className = "failed";
+    failure.textContent = `This page cannot show its scene: ${error.message}.`;
+    document.getElementById("viewer").append(failure);
     console.warn(`translucent: ${error.message}`);
     return undefined;
   }

@@ -29,7 +29,7 @@ def new_node(tree, kind, **values):
     return node
 
 
-def material_of(told, number, engine):
+def material_of(description, number, engine):
     """Glass or a transparent surface, and a volume with the coefficients of the medium; or a diffuse surface.
 
     Rays that EEVEE refracts do not see volumes: its clear glass gets the color of the mean chord.
@@ -39,45 +39,45 @@ def material_of(told, number, engine):
     tree = material.node_tree
     tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputMaterial")
-    if told["type"] == "opaque":
-        color = (*told["diffuse_reflectance"], 1.0)
+    if description["type"] == "opaque":
+        color = (*description["diffuse_reflectance"], 1.0)
         surface = new_node(tree, "ShaderNodeBsdfDiffuse", Color=color, Roughness=0.0)
         tree.links.new(surface.outputs[0], output.inputs["Surface"])
         return material
-    if told["ior"] == 1.0:
+    if description["ior"] == 1.0:
         surface = tree.nodes.new("ShaderNodeBsdfTransparent")
     else:
-        surface = new_node(tree, "ShaderNodeBsdfGlass", IOR=told["ior"], Roughness=told["roughness"])
+        surface = new_node(tree, "ShaderNodeBsdfGlass", IOR=description["ior"], Roughness=description["roughness"])
         surface.distribution = "MULTI_GGX"
         if hasattr(material, "use_raytrace_refraction"):
             material.use_raytrace_refraction = True  # EEVEE
     tree.links.new(surface.outputs[0], output.inputs["Surface"])
-    if engine == "eevee" and told["ior"] != 1.0 and not any(told["scattering"] + told["emission"]):
-        color = [math.exp(-each * told["mean_chord"]) for each in told["absorption"]]
+    if engine == "eevee" and description["ior"] != 1.0 and not any(description["scattering"] + description["emission"]):
+        color = [math.exp(-each * description["mean_chord"]) for each in description["absorption"]]
         surface.inputs["Color"].default_value = (*color, 1.0)
         return material
     volume = tree.nodes.new("ShaderNodeVolumeCoefficients")
     for name, value in (("Absorption", "absorption"), ("Scatter", "scattering"), ("Emission", "emission")):
-        volume.inputs[f"{name} Coefficients"].default_value = told[value]
-    volume.inputs["Anisotropy"].default_value = told["anisotropy"]
+        volume.inputs[f"{name} Coefficients"].default_value = description[value]
+    volume.inputs["Anisotropy"].default_value = description["anisotropy"]
     tree.links.new(volume.outputs[0], output.inputs["Volume"])
     return material
 
 
 def build(folder, engine, samples):
     """Set up the scene of a folder."""
-    told = json.loads((folder / "scene.json").read_text(encoding="utf-8"))
+    description = json.loads((folder / "scene.json").read_text(encoding="utf-8"))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.import_scene.gltf(filepath=str(folder / "scene.glb"))
     scene = bpy.context.scene
     for item in list(bpy.data.objects):
         if item.type == "LIGHT":
             bpy.data.objects.remove(item)
-    for number, one in enumerate(told["objects"]):
+    for number, one in enumerate(description["objects"]):
         mesh = bpy.data.objects[f"object_{number}"]
         mesh.data.materials.clear()
         mesh.data.materials.append(material_of(one, number, engine))
-    for light in told["lights"]:
+    for light in description["lights"]:
         add_light(scene, light)
     world = bpy.data.worlds.new("world")
     scene.world = world
@@ -94,8 +94,8 @@ def build(folder, engine, samples):
     tree.links.new(picture.outputs[0], background.inputs["Color"])
     output = tree.nodes.new("ShaderNodeOutputWorld")
     tree.links.new(background.outputs[0], output.inputs["Surface"])
-    set_camera(scene, told["camera"])
-    scene.render.resolution_x, scene.render.resolution_y = told["size"]
+    set_camera(scene, description["camera"])
+    scene.render.resolution_x, scene.render.resolution_y = description["size"]
     scene.render.resolution_percentage = 100
     scene.render.filter_size = 1.0
     scene.render.image_settings.file_format = "OPEN_EXR"
@@ -104,41 +104,41 @@ def build(folder, engine, samples):
     if engine == "cycles":
         use_cycles(scene, samples)
     else:
-        use_eevee(scene, samples, told)
+        use_eevee(scene, samples, description)
 
 
-def set_camera(scene, told):
+def set_camera(scene, description):
     """Place the camera, with its vertical angle."""
     camera = bpy.data.objects.new("benchmark camera", bpy.data.cameras.new("benchmark"))
     scene.collection.objects.link(camera)
     pose = mathutils.Matrix.Identity(4)
-    columns = told["right"], told["up"], [-value for value in told["forward"]], told["eye"]
+    columns = description["right"], description["up"], [-value for value in description["forward"]], description["eye"]
     for column, values in enumerate(columns):
         for row in range(3):
             pose[row][column] = values[row]
     camera.matrix_world = AXES @ pose
     camera.data.sensor_fit = "VERTICAL"
-    camera.data.angle_y = math.radians(told["fov_y_degrees"])
+    camera.data.angle_y = math.radians(description["fov_y_degrees"])
     away = pose.translation.length
     camera.data.clip_start, camera.data.clip_end = 1e-3 * away, 1e2 * away
     scene.camera = camera
 
 
-def add_light(scene, told):
+def add_light(scene, description):
     """Add a point or directional light: watts are 4 pi times the intensity in W/sr."""
-    strength = told.get("irradiance") or told["intensity"]
+    strength = description.get("irradiance") or description["intensity"]
     brightest = max(strength)
-    data = bpy.data.lights.new("light", "SUN" if told["type"] == "directional" else "POINT")
+    data = bpy.data.lights.new("light", "SUN" if description["type"] == "directional" else "POINT")
     data.color = [value / brightest for value in strength]
     item = bpy.data.objects.new("light", data)
     scene.collection.objects.link(item)
-    if told["type"] == "directional":
+    if description["type"] == "directional":
         data.energy, data.angle = brightest, 0.0
         item.rotation_mode = "QUATERNION"
-        item.rotation_quaternion = (AXES.to_3x3() @ mathutils.Vector(told["direction"])).to_track_quat("-Z", "Y")
+        item.rotation_quaternion = (AXES.to_3x3() @ mathutils.Vector(description["direction"])).to_track_quat("-Z", "Y")
     else:
         data.energy, data.shadow_soft_size = brightest * 4 * math.pi, 0.0
-        item.location = AXES @ mathutils.Vector(told["position"])
+        item.location = AXES @ mathutils.Vector(description["position"])
 
 
 def use_cycles(scene, samples):
@@ -154,7 +154,7 @@ def use_cycles(scene, samples):
         setattr(cycles, f"{name}_bounces", 128)
 
 
-def use_eevee(scene, samples, told):
+def use_eevee(scene, samples, description):
     """Configure EEVEE: screen-space ray tracing, finest shadows and volumes.
 
     A sample takes a volume for as thick as the cells of a grid along the view, or does not see it, by chance. So thin
@@ -164,7 +164,9 @@ def use_eevee(scene, samples, told):
     eevee = scene.eevee
     eevee.taa_render_samples, eevee.use_raytracing, eevee.use_shadows = samples, True, True
     eevee.ray_tracing_options.resolution_scale = "1"
-    bodies = [(bpy.data.objects[f"object_{i}"], one) for i, one in enumerate(told["objects"]) if one["type"] == "body"]
+    bodies = [
+        (bpy.data.objects[f"object_{i}"], one) for i, one in enumerate(description["objects"]) if one["type"] == "body"
+    ]
     thin = any(CELLS * one["mean_chord"] < max(item.dimensions) for item, one in bodies)
     eevee.volumetric_tile_size, eevee.volumetric_samples = "2", 2 * CELLS if thin else CELLS
 
