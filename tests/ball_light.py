@@ -38,7 +38,7 @@ def ball_light(
     Returns
     -------
     flux, distance : (n,) float64
-        Of all parts of all rays: those that are mirrored, those that pass at once, those that are mirrored inside once,
+        Of all parts of all rays: mirrored, passing at once, mirrored inside once,
         and so on. A distance is inf where one does not land.
     """
     return ball_parts(below, ior, lamp=lamp, absorption=absorption, rays=rays)[:2]

@@ -93,7 +93,7 @@ def _width(kind: str) -> int:
 
 
 def feedback_program(source: str, signature: Signature) -> str:
-    """Vertex shader that calls the function: arrays are rows of textures, of which there is one for each."""
+    """Vertex shader that calls the function: each array is a row of a texture of its own."""
     inputs: list[str] = []
     before: list[str] = []
     for kind, name, length in signature.parameters:

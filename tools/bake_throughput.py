@@ -149,7 +149,7 @@ def batch(mesh: Mesh, count: int, size: int, rays: int, workers: int, dask: str 
 
 
 def _used() -> float:
-    """Processor seconds of this process and of those that it has had and that have ended."""
+    """Processor seconds of this process and of its children that have ended."""
     found = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in found)
 

@@ -184,7 +184,7 @@ def run_alone(reader: Reader, path: Path) -> Run:
     with tempfile.TemporaryFile() as told, tempfile.TemporaryFile() as printed:
         before = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # of threads, none of which reads
+            warnings.simplefilter("ignore", DeprecationWarning)  # of threads; none of them reads
             child = os.fork()
         if child == 0:
             _read_and_exit(reader, path, told.fileno(), printed.fileno())

@@ -232,7 +232,7 @@ def _polygon(count: int) -> bytes:
 
 
 def _apart(count: int) -> bytes:
-    """Tetrahedra, apart and one in another, half of which look inwards."""
+    """Tetrahedra, apart and one in another; the faces of half of them look inwards."""
     corners, faces = (
         np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]),
         [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)],

@@ -109,7 +109,7 @@ def opened(random: Random) -> Damaged:
 
 
 def flipped(random: Random) -> Damaged:
-    """A mesh some faces of which look the wrong way: any, those of a box, or all of a part."""
+    """A mesh with faces that look the wrong way: any, those of a box, or all of a part."""
     mesh = closed(random)
     kind = random.integers(4)
     if kind == 0:

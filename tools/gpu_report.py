@@ -4,7 +4,7 @@ Into OUT (default: out/gpu-report): the tests of rendering on this device (tests
 (report.json, .svg, .html), frames of large models of glass, wine and wax (frames.json), frame times of the previewer
 where there is a display (preview.txt), our results on the benchmark as one file to send (benchmark/ours.zip), and
 summary.md with what came of each. With ``--keep`` the report and the frames become docs/reports/gpu.json, gpu.svg and
-gpu-frames.json. A step that fails is told at the end, and leaves the others alone. On a software rasterizer only with
+gpu-frames.json. A step that fails is named at the end, and leaves the others alone. On a software rasterizer only with
 ``--software``, to try this tool out: models and frames are small then.
 """
 

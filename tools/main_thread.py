@@ -12,7 +12,7 @@ from types import FrameType
 #: Seconds between two looks.
 INTERVAL = 0.004
 
-#: Functions of the toolkit that are told, the innermost last.
+#: Functions of the toolkit that are named, the innermost last.
 TOLD = 4
 
 

@@ -94,7 +94,7 @@ def compare(mesh: tl.Mesh, mode: str, rounds: int, processor_time: bool) -> str:
 
 
 def most_memory(mesh: tl.Mesh, rays: int, share: float) -> str:
-    """Bake a large map, of which the mesh fills a share of the rows, write it, and tell what it took."""
+    """Bake and write a large map whose rows the mesh fills in part; return what it took."""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     with_uv = unwrap(mesh, 4096, None).mesh
     assert with_uv.uv is not None

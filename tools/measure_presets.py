@@ -66,7 +66,7 @@ def truth_of(renderer: tl.Renderer, scene: tl.Scene, mask: npt.NDArray[np.bool_]
 def measure(
     renderer: tl.Renderer, preset: Preset, environments: list[str], known: dict[str, Any] | None
 ) -> dict[str, Any]:
-    """Mean colors of a preset in environments; `known`: those of which only the drawn ones are to be measured."""
+    """Mean colors of a preset in environments; `known`: rows whose truth is kept and whose picture is drawn anew."""
     rows = {}
     for environment in environments if known is None else known:
         scene = scene_of(preset, environment)

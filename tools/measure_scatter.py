@@ -34,7 +34,7 @@ RADII, TOWARDS = (60, 30, 10), np.ones(3) / np.sqrt(3.0)
 
 SIZE = (320, 320)
 
-#: Extinction in 1/m of a body of which only its mirror is seen.
+#: Extinction in 1/m of a body that shows only its mirrored light.
 BLACK = 1e7
 
 

@@ -2,8 +2,8 @@
 
 What a user could do, in an order that nobody would: fields with good and with bad values, models that are none, undo,
 sizes. After every action the picture is drawn. Fails on an exception, an OpenGL error, a document that changed though
-its action was refused, or objects that become more and more. Memory is told, and no reason to fail: a software OpenGL
-compiles each shader anew for every state that it meets, and keeps all of that.
+its action was refused, or objects that become more and more. Memory is printed, and no reason to fail: a software
+OpenGL compiles each shader anew for every state that it meets, and keeps all of that.
 """
 
 from __future__ import annotations

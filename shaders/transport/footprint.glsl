@@ -106,7 +106,7 @@ Ellipse ellipse_of(Footprint footprint) {
     float right = dot(direction[0], direction[0]), down = dot(direction[1], direction[1]), both = dot(direction[0], direction[1]);
     float middle = 0.5 * (right + down), off = length(vec2(0.5 * (right - down), both));
     float longer = (middle + off) / 12.0, shorter = max(middle - off, 0.0) / 12.0;
-    // Of the two sides' combinations, that which is the longer axis.
+    // Angle that combines the two sides to the longer axis.
     float turn = 0.5 * atan(2.0 * both, right - down);
     return Ellipse((cos(turn) * direction[0] + sin(turn) * direction[1]) / sqrt(12.0), sqrt(shorter));
 }

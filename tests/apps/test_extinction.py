@@ -122,7 +122,7 @@ def test_for_an_engine_only_the_block_is_printed(run: Run, monkeypatch: pytest.M
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_every_engine_has_a_block(run: Run, target: str) -> None:
-    """A color has no surface, which is told where the material has one."""
+    """A color has no surface: a message says so where the material has one."""
     code, out, err = run("#7b1e3a", "1cm", "--as", target)
     assert code == 0
     assert ("its ior is 1" in err) == (target not in ("css", "json"))

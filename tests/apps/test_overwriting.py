@@ -1,4 +1,4 @@
-"""No verb replaces a file that it reads, under whatever name, unless it is told to."""
+"""No verb replaces a file that it reads, under whatever name, unless an option allows it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random paths on the command line, and how their progress is told."""
+"""Random paths on the command line, and how their progress is reported."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ MERLOT, JADE = tl.preset("merlot").medium, tl.preset("jade").medium
 
 @pytest.fixture
 def bar(tmp_path: Path) -> Path:
-    """Three boxes: two of glass, of which the second is red in a variant, and one that is opaque and can fall."""
+    """Three boxes: one of glass, one of glass that is red in a variant, and an opaque one that can fall."""
     path = write_scene(tmp_path / "bar.glb", {"extensions": GLASS}, {"extensions": GLASS}, {"name": "Wood"})
     file = read_gltf(path)
     tree = file.tree

@@ -97,7 +97,7 @@ def test_a_ball_gives_back_each_harmonic_as_itself() -> None:
 
 
 def test_what_enters_a_lossless_body_leaves_it() -> None:
-    """In uniform light a matched one gives back all that it does not let pass: next to all, if it is dense.
+    """In uniform light a matched body reflects all that it does not transmit: next to all, if it is dense.
 
     In a body that sees itself, too: what leaves it and falls on it again is scattered once more.
     """

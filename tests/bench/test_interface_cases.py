@@ -116,7 +116,7 @@ def test_noise_of_the_reference_is_no_error(rng: np.random.Generator) -> None:
     found = noisy.errors(shown, "radiance")
     assert found is not None
     assert found[0].rms * noisy.scale("radiance") == pytest.approx(0.1, rel=0.1)
-    # What noise hides is no zero: with halves of 0.3, the square's standard error over pixels is told at least.
+    # What noise hides is no zero: with halves of 0.3, the square's standard error over pixels is reported at least.
     unseen = dataclasses.replace(noisy, rays=8).errors(truth.frame, "radiance")
     least = np.sqrt(0.3**2 / np.sqrt(3 * truth.compared.sum()))
     assert unseen is not None

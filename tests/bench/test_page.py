@@ -48,7 +48,7 @@ FAMILIES = ("SignedDepth", "BackFaceDepth", "constant thickness", "KBuffer", "Fr
 
 
 def unlike() -> Iterator[float]:
-    """Numbers of which no two look alike with two digits."""
+    """Numbers that all differ in two digits."""
     return itertools.cycle((1.0 + k / 10) * 10.0**e for e in (-7, -6, -5, -4, -3, -2) for k in range(90))
 
 

@@ -161,7 +161,7 @@ FIGURE = re.compile(
     r"(?<![\w.#/-])\d[\d.,]*(?: to \d[\d.,]*)? ?(?:%|(?:ms|s|us|µs|seconds?|minutes?|times|[kMG]B|megabytes?|fps)\b)"
 )
 
-#: Those that define something: limits, defaults and examples. What is measured is generated, or dated in docs/notes/.
+#: Numbers that define something: limits, defaults and examples. What is measured is generated, or dated in docs/notes/.
 DEFINED = {
     "docs/baking-files.md": {"2 %"},
     "docs/benchmark.md": {"0.5 %", "5 %", "10 %", "15 %", "97 %", "99 %", "99.9 %"},

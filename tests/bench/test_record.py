@@ -1,4 +1,4 @@
-"""Reports survive being written and read, and files that are no reports are told apart."""
+"""Reports survive being written and read, and files that are no reports are refused."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def test_a_body_that_winds_twice_is_left_twice_and_keeps_its_turn() -> None:
     interior, media = empty_interior_lists(1), InteriorMedia(InterfaceTable(scene_of(0, 0), (None, None)))
     for item in (0, 1, 0):
         enter(interior, RAY, at(item))
-    assert media.effective(interior).tolist() == [1], "of equal ones that which was entered last"
+    assert media.effective(interior).tolist() == [1], "of equal priorities the medium that was entered last"
     leave(interior, RAY, at(0))
     assert has(interior, at(0)).all()
     leave(interior, RAY, at(1))

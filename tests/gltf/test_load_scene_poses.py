@@ -214,7 +214,7 @@ def test_other_broken_animations_are_refused(tmp_path: Path) -> None:
 
 
 def varied() -> Writer:
-    """Two boxes, of which one has another medium in the variants Red and Late, and one none of its own."""
+    """Two boxes: one has another medium in the variants Red and Late, the other none of its own."""
     writer = Writer()
     own, other = writer.material(name="Own", extensions=glass()), writer.material(name="Other", extensions=WINE)
     mapping = {"KHR_materials_variants": {"mappings": [{"material": other, "variants": [1, 2]}]}}

@@ -1,4 +1,4 @@
-"""Adaptive sampling: the picture of all samples, from rays traced for those that matter."""
+"""Adaptive sampling: the picture of all samples, from rays of the samples that matter."""
 
 from __future__ import annotations
 

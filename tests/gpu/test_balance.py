@@ -33,7 +33,7 @@ def balance(found: tl.Scene, method: Method | None = None) -> Balance:
 
 
 def half_turned() -> tl.Mesh:
-    """Two boxes apart, of which one looks inwards."""
+    """Two boxes apart; the faces of one look inwards."""
     box = trimesh.creation.box((1, 1, 1))
     vertices = np.concatenate([box.vertices, box.vertices + [3.0, 0.0, 0.0]])
     return tl.Mesh(vertices, np.concatenate([box.faces, box.faces[:, ::-1] + len(box.vertices)]))

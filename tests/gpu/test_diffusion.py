@@ -212,7 +212,7 @@ def test_only_what_changes_the_light_is_solved_for_again(renderer: tl.Renderer, 
 
 
 def test_bodies_keep_their_own_light(renderer: tl.Renderer, solved: list[tl.Medium]) -> None:
-    """Two balls of different media are those that each is alone."""
+    """Two balls of different media look as each does alone."""
     other = tl.Medium(absorption=(3.0, 0.1, 0.1), scattering=40.0, ior=1.3)
     left, right = (
         tl.Object(BALL, medium, np.array([(1, 0, 0, x), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1.0)]))
@@ -234,7 +234,7 @@ def test_bodies_keep_their_own_light(renderer: tl.Renderer, solved: list[tl.Medi
         found, expected = (frame.radiance[:, half][covered] for frame in (both, single))
         # They mirror one another a little: a ball that fills 1/64 of what the other sees.
         np.testing.assert_allclose(found, expected, rtol=0.02, atol=0.01)
-    # Which the other medium would not pass for: of red one gives back much more.
+    # The media differ much: one reflects far more red.
     means = [both.radiance[:, half][both.coverage[:, half]].mean(axis=0) for half in (slice(0, 24), slice(24, 48))]
     assert means[0][0] / means[0][2] > 1.2 * means[1][0] / means[1][2]
 
@@ -267,7 +267,7 @@ def test_bodies_of_uneven_density_vanish_in_white_light(renderer: tl.Renderer) -
 
 
 def test_bodies_without_an_interface_are_seen_by_their_angle(renderer: tl.Renderer) -> None:
-    """A dense ball in uniform light shows on the mean over its disk what a half-space gives back, on both backends."""
+    """A dense ball in uniform light shows on the mean over its disk what a half-space reflects, on both backends."""
     camera = tl.Camera.orthographic((0, 0, 5), (0, 0, 0), height=2.0)
     scene = lit_ball(tl.Medium(absorption=60.0, scattering=240.0), lights=[], camera=camera)
     with tl.Renderer(backend="cpu") as other:

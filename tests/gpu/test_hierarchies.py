@@ -29,7 +29,7 @@ from translucent.reference.hits import camera_hits
 OWN = ("bear", "goblet", "knot", "bangle")
 THIRD_PARTY = ("bunny.obj", "armadillo.obj")
 
-#: Share of random rays on which two tracers in float32 may differ by more than rounding: those that graze a silhouette.
+#: Share of random rays on which two tracers in float32 may differ by more than rounding: they graze a silhouette.
 DIFFERENT = 2e-5
 
 CAMERA = tl.Camera.look_at((0, 0, 5), (0, 0, 0))
@@ -257,7 +257,7 @@ def test_textures_that_do_not_fit_are_refused_before_they_are_built(monkeypatch:
         tl.RenderError, match=r"this OpenGL allows 2048 texels along a side, .* use interfaces=tl.ScreenInterfaces\(\)$"
     ):
         SceneHierarchies(fake(2048), [ball()], 1)
-    # Thirty million triangles, of which only the number is asked for.
+    # Thirty million triangles: only their number is read.
     crowd: Any = SimpleNamespace(faces=np.broadcast_to(np.int32(0), (30_000_000, 3)))
     with pytest.raises(tl.RenderError, match=r"at least 119,999,992 texels, .* allows 67,108,864; .* coarser meshes"):
         SceneHierarchies(fake(16384), [crowd], 1)

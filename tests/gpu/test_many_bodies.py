@@ -119,7 +119,7 @@ def test_more_bodies_over_one_another_than_traced_rays_know_of_are_named(rendere
 
 
 def test_sixty_media_side_by_side_are_told_apart(renderer: tl.Renderer) -> None:
-    """A sum needs no winding numbers, of which a ray keeps 16 apart: each box has the optical depth of its medium."""
+    """A sum needs no winding numbers, which a ray has for 16 bodies: each box has the optical depth of its medium."""
     at = trimesh.transformations.translation_matrix
     boxes = [tl.Object(BOX, tl.Medium(absorption=1.0 + i), at((1.5 * i, 0, 0)), priority=i % 7) for i in range(60)]
     pose = np.eye(4)

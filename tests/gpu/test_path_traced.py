@@ -279,7 +279,7 @@ def test_paths_that_are_cut_short_are_told(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_the_truth_image(transport: ModuleType, renderer: tl.Renderer) -> None:
-    """Wine in a glass, both of which bend light: what is left is the noise that the frame tells of."""
+    """Wine in a glass, both of which bend light: only the noise that the frame states is left."""
     scene, size = transport.make("goblet_wine")
     truth = transport.load("goblet_wine")
     frame = renderer.render(scene, (size, size), tl.PathTraced(8), samples=16)

@@ -252,7 +252,7 @@ def test_directions_below_a_ground_have_maps_where_its_lower_side_is_seen(render
     assert atlas.drawn == {view for view in sky if view.camera.forward[1] < 0}
     assert 0 < len(atlas.drawn) < 16
     below = renderer.render(replace(above, camera=BELOW), SIZE)
-    assert atlas.drawn == sky  # those that were there are kept
+    assert atlas.drawn == sky  # earlier ones are kept
     np.testing.assert_array_equal(renderer.render(above, SIZE).radiance, frame.radiance)
     # Seen from below the ball is behind the ground, and takes next to nothing of its light.
     truth = tl.reference.render(replace(above, camera=BELOW), SIZE)
@@ -412,7 +412,7 @@ def test_a_layer_that_becomes_a_sheet_throws_its_shadow(renderer: tl.Renderer) -
 
 
 def test_maps_that_do_not_fit_are_smaller(renderer: tl.Renderer) -> None:
-    """As for many lights in the middle of a room, each of which takes six maps."""
+    """As for many lights in the middle of a room: each takes six maps."""
     cameras = [CAMERA] * 6
     views = ShadowViews.of([(cameras, (0,), np.zeros(3))] * 32, [([CAMERA], (0,), np.zeros(3))] * 256, 8192, 16384)
     assert views.lights[0][0].size == 256

@@ -77,7 +77,7 @@ SUBJECTS = {
 }
 
 
-#: Who promises the exact thickness of which solid.
+#: Methods that promise the exact thickness, for each solid.
 CLAIMS = [
     *((tl.SignedDepth(), name) for name in SUBJECTS),
     *((tl.BackFaceDepth(), name) for name, subject in SUBJECTS.items() if subject.convex),

@@ -80,7 +80,7 @@ def test_times_of_passes_are_those_of_all_samples(
         tl.Mesh(box.vertices, box.faces), tl.Medium(absorption=(1, 2, 3), ior=1.5), size=(16, 12), stage="none"
     )
     frame = renderer.render(scene, size=(16, 12), samples=samples)
-    # Of several samples, one more is drawn: the ray through the pixel center, for thickness, of which no light is seen.
+    # Of several samples, one more is drawn: the ray through the pixel center, for thickness alone.
     light = {PassName.TRACED}
     assert measured == {
         step.name: samples if samples == 1 or step.name in light else samples + 1 for step in frame.plan.passes

@@ -100,7 +100,7 @@ def _left_of_light(scene: Any, studio: Any) -> Array:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_floor_ends_the_path_through_the_ball(renderer: tl.Renderer, studio: Any, kind: str) -> None:
-    """Against the same scene with opaque objects of the toolkit, of which the float64 reference sees the thickness."""
+    """Against the same scene with opaque objects of the toolkit: the float64 reference sees their thickness."""
     scene = studio.scene(kind)
     frame = render(scene, {"ball": GREEN}, SIZE, renderer=renderer)
     ours = scene_from_pyrender(scene, {"ball": GREEN}, SIZE)

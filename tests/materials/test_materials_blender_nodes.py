@@ -80,7 +80,7 @@ def test_the_blender_snippet_runs_and_sets_the_sockets(
     )
 
     class Material:
-        """Up to version 4 it has no nodes until it is told to use them; from 5 on, telling it is deprecated."""
+        """Up to version 4 it has nodes only once `use_nodes` is set; from 5 on, setting it is deprecated."""
 
         node_tree = tree if version == 5 else None
 

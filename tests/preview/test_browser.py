@@ -1,4 +1,4 @@
-"""Files without the system's dialogs, environments of a folder, and what is told about knobs. No window."""
+"""Files without the system's dialogs, environments of a folder, and the tips of knobs. No window."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shaders compiled by another process: those that the window needs, while it shows the last picture."""
+"""Another process compiles the shaders that the window needs, while it shows the last picture."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def test_an_object_is_isolated_and_the_last_one_is_not_hidden(work: Workspace) -
     work.frame(1)
     state.pick((0.5, 0.5), found.append)
     wait(work, lambda: bool(found))
-    assert found == [1], "it is told by its number in the model"
+    assert found == [1], "its number in the model identifies it"
     state.hide(1)
     assert "no other object is visible" in work.messages[-1].text
     shot = Recipe(work.document, loaded, scene, (48, 32))

@@ -43,7 +43,7 @@ def _model_that_is_none(work: Workspace) -> None:
 
 @pytest.fixture
 def preview(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Any]:
-    """Runs the verb with a script of which the window would do what `actions` does."""
+    """Run the verb with a script; `actions` stands for what the window does."""
 
     def _run(actions: Callable[[Workspace], None], *arguments: str) -> Any:
         def stand_in(document: Document, *_: object) -> Workspace:

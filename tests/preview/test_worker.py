@@ -1,4 +1,4 @@
-"""Work in a process of its own: what it is sent and keeps, how it ends, and what is told when it dies."""
+"""Work in a process of its own: what it is sent and keeps, how it ends, and what is reported when it dies."""
 
 from __future__ import annotations
 
@@ -256,7 +256,7 @@ def runs(process: int) -> bool:
 
 
 class Fake:
-    """A worker without a process, whose work is done when it is told."""
+    """A worker without a process; its work is done when the test says so."""
 
     def __init__(self, _: object, *, pictures: bool) -> None:
         self.process = SimpleNamespace(is_alive=lambda: True)

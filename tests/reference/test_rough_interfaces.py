@@ -96,7 +96,7 @@ def test_light_turned_to_lamps_is_the_density_of_directions(
 
 @pytest.mark.parametrize("alpha", [0.1, 0.7])
 def test_a_rough_interface_is_reciprocal(alpha: float, rng: np.random.Generator) -> None:
-    """The share of diffuse light that enters is n^2 times that which leaves: n^2 (1 - R_in) = 1 - R_out."""
+    """The fraction of diffuse light that enters is n^2 times the fraction that leaves: n^2 (1 - R_in) = 1 - R_out."""
     count, ior = 200_000, 1.5
 
     def passed(relative: float) -> Array:

@@ -1,4 +1,4 @@
-"""Light that a scattering half-space gives back: against exact moments and a published value, and in limits."""
+"""Light that a scattering half-space reflects: against exact moments and a published value, and in limits."""
 
 from __future__ import annotations
 

@@ -170,7 +170,7 @@ def test_irradiance_of_a_point_light_falls_with_the_square_and_the_cosine() -> N
     assert light.irradiance_on((1, 2, 1), up) == pytest.approx((1, 2, 0), rel=2 * EPS)
     assert light.irradiance_on((1, 2, 1), down).tolist() == [0, 0, 0]
     assert light.irradiance_on((4, 6, 3), up).tolist() == [0, 0, 0]
-    # 5 m away, of which 3 m are along the normal.
+    # 5 m away, 3 m of it along the normal.
     assert light.irradiance_on((5, 2, 0), up) == pytest.approx(np.array((4, 8, 0)) * 0.6 / 25, rel=4 * EPS)
     points = np.zeros((4, 1, 3))
     assert light.irradiance_on(points, np.tile(up, (5, 1))).shape == (4, 5, 3)

@@ -1,4 +1,4 @@
-"""Media from photographs: the truth lies within the error bars that are told as often as they say."""
+"""Media from photographs: the truth lies within the error bars as often as they say."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ KINDS = ("noise", "8 bits", "JPEG", "two exposures, ior known", "thicknesses 0.0
 
 
 def drawn(kind: str, rng: np.random.Generator, folder: Path) -> tuple[list[Photograph], float | None]:
-    """Random photographs of one kind, and the index of refraction that is told."""
+    """Random photographs of one type, and the index of refraction that is given."""
     exposures, ior, thicknesses = [0.8], None, STEPS
     if kind in ("8 bits", "JPEG"):
         exposures = [rng.uniform(0.4, 0.9)]

@@ -106,7 +106,7 @@ def _area_ratios(grid: BodyGrid, thickness: Array, samples: Integers) -> Array:
     From the spreads of neighboring samples on both sides.
     """
     points, normals = grid.points, grid.normals
-    # Those that means of means at the samples read.
+    # Means of means at the samples read their neighbors' neighbors.
     for _ in range(MEANS):
         samples = np.unique(grid.nearest[samples])
     nearest, own = grid.nearest[samples], normals[samples]

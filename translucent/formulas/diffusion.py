@@ -214,11 +214,11 @@ def ahead_mirrored(
 ) -> Array:
     """Fraction of forward-scattered light that an interface mirrors where a ray leaves a medium.
 
-    After a depth s of scattering, the scattered light has the mean cosine c with the ray. Of it, 1 - c counts as
-    isotropic, of which the interface mirrors r, and c as going ahead. If the interface mirrors m of all, it mirrors
-    r - (r - m) / c of what goes ahead: Fresnel's reflectance F of the ray for c = 1, and q = r - 2 mu (r - R_j) for
-    c = 0. Between both, q + (F - q) c^p with p = 0.5 / |angle to the critical one| fits the light of Henyey and
-    Greenstein to 0.03 in the mean, and to 0.15 near the critical angle.
+    After a depth s of scattering, the scattered light has the mean cosine c with the ray. A fraction 1 - c counts as
+    isotropic, and the interface mirrors r of it; a fraction c counts as going ahead. If the interface mirrors m of
+    all, it mirrors r - (r - m) / c of what goes ahead: Fresnel's reflectance F of the ray for c = 1, and
+    q = r - 2 mu (r - R_j) for c = 0. Between both, q + (F - q) c^p with p = 0.5 / |angle to the critical one| fits the
+    light of Henyey and Greenstein to 0.03 in the mean, and to 0.15 near the critical angle.
 
     Parameters
     ----------

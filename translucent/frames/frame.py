@@ -114,7 +114,7 @@ MAX_EXPOSURE = 100.0
 class Frame:
     """A rendered picture with its physical quantities. Row 0 is the top row; arrays are contiguous and the caller's.
 
-    Those that follow from what was read back are made when they are first read.
+    Arrays that follow from others are computed when they are first read.
 
     Attributes
     ----------

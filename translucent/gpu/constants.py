@@ -97,7 +97,7 @@ HIERARCHY_WIDTH_BITS = 12
 #: Width of the textures that hold photons, in texels.
 PHOTON_WIDTH = 512
 
-#: Surfaces on the path of a photon, after as many of which it ends.
+#: A photon ends after so many surfaces.
 MOST_PHOTON_HITS = 96
 
 #: Types of objects, in the order of their numbers: an absorber is a thin wall that only absorbs and emits, and what is

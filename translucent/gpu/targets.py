@@ -108,7 +108,7 @@ class Storage:
     ----------
     gl : moderngl.Context
     owner : str
-        What errors call that which the buffers are for.
+        What the buffers are for, in the words of errors.
     """
 
     def __init__(self, gl: moderngl.Context, owner: str) -> None:

@@ -33,7 +33,7 @@ class Caustics:
     """Light of the lights of a scene that interfaces bend and mirror onto opaque objects and media, by photons.
 
     Photons (Jensen 1996) leave the lights towards the bodies. Interfaces refract or reflect them in the proportions of
-    Fresnel's equations, and those that take the same branches are as even as all; media absorb along the path.
+    Fresnel's equations, and photons of the same branches are spread as evenly as all; media absorb along the path.
     Refracted or reflected photons land on the first opaque surface, and are drawn into the picture of the opaque
     objects (McGuire & Luebke 2009), each divided by the area that its pixel covers there. Each is a square that takes
     the space of some photons there, up to a pixel wide (photon differentials, Schjoeth et al. 2007); where there
@@ -88,8 +88,8 @@ SECONDS_OF_A_PHOTON = 2.5e-5
 _CARRYING = PassName.LIGHT_VIEWS, PassName.TRACED, PassName.SURFACES
 
 
-#: Seconds of a processor core on a software rasterizer, of which only ratios count: a sample of a pixel, and each light
-#: on it; a photon that shaders follow; and in each of four samples a pixel of what photons land on.
+#: Seconds of a processor core on a software rasterizer, to be compared with each other: a sample of a pixel, and each
+#: light on it; a photon that shaders follow; and in each of four samples a pixel of what photons land on.
 PIXEL_SAMPLE, LIGHT_SAMPLE, PHOTON, RECEIVER = 3.1e-7, 3.4e-7, 2.3e-6, 4.2e-7
 
 #: Samples that have photons, at most.

@@ -626,7 +626,7 @@ model.time = Time of the file's animations in seconds: nodes, skins and morph ta
 material.color_texture = baseColorTexture (glTF): a picture (.png, .jpg) over the texture coordinates of the mesh, which
     tints what passes the surface.
 material.pattern = Pattern on surfaces without textures: veins of marble, bubbles of air in ice, or blotches of skin.
-material.roughness_texture = metallicRoughnessTexture (glTF): a picture, the green of which multiplies the roughness.
+material.roughness_texture = metallicRoughnessTexture (glTF): a picture; its green multiplies the roughness.
 placed.location = How far the object is moved, in metres. Or drag its gizmo (W).
 placed.rotation = Degrees about X, then Y, then Z, around its middle. Or drag its gizmo (R).
 placed.scale = Factors along X, Y and Z. Media keep their lengths. Or drag its gizmo (S).

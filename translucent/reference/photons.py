@@ -53,7 +53,7 @@ def trace_photons(scene: Scene, photons: int = 100_000, seed: int = 0) -> Landed
     """Follow photons from each light to the first opaque surface (Jensen 1996).
 
     They aim at a ball around all bodies. Interfaces reflect or refract them by chance, media absorb on the path what
-    they absorb, and end what they scatter. Those that come straight are left out, as they are no caustics.
+    they absorb, and end what they scatter. Photons that meet no interface are left out, as they are no caustics.
 
     Parameters
     ----------

@@ -347,7 +347,7 @@ def light_over_pixels(
     size : (width, height)
         In pixels.
     pixels : (h, w) bool
-        Those that are requested.
+        True where light is requested.
     paths : int
         Rays of each.
     tolerance, bounces, seed
