@@ -31,6 +31,11 @@ float coat_reflectance(vec2 clearcoat, float cosine) {
 #endif
 }
 
+// Fraction of the light from inside that leaves through an interface and its coat. passing: what its base lets pass, with its color.
+vec3 leaving_fraction(vec3 passing, float cosine, float ior, float roughness, vec2 clearcoat) {
+    return passing * (1.0 - interface_reflectance(cosine, ior, roughness)) * (1.0 - coat_reflectance(clearcoat, cosine));
+}
+
 // Fraction of the light that a polished clear coat reflects. clearcoat: fraction of the interface that has it.
 float polished_coat_reflectance(float clearcoat, float cosine) {
 #if CLEAR_COAT

@@ -1,6 +1,7 @@
 // Where a ray hits no interface: what is behind, through the media there. Row 0 of the output is the top row.
 // REST: beyond the part of the picture that media may cover. In that part, depth lets shade/surfaces.frag pass where there
-// is an interface, and nothing is added to a sum there; APART: but for transmittance.
+// is an interface, and nothing is added to a sum there; APART: but for transmittance, and STRAIGHT_LIGHT: but for what media
+// add along the straight ray.
 
 #include <constants>
 #include <View>
@@ -8,6 +9,13 @@
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
 #include "shade/background.glsl"
+#if STRAIGHT_LIGHT
+#include <ObjectRow>
+#include "shade/interface_bsdf.glsl"
+
+uniform sampler2D surface_parameters;  // of what is entered: object, roughness, transmission, variance of normals
+uniform sampler2D surface_color;
+#endif
 
 uniform float weight;  // samples that this one counts as
 
@@ -36,7 +44,8 @@ void main() {
     ivec2 here = ivec2(gl_FragCoord.xy);
     vec3 emitted = texelFetch(emitted_radiance_sum, here, 0).rgb;
     vec3 through = texelFetch(straight_transmittance, here, 0).rgb;
-    float front = texelFetch(entered, texel, 0).w;
+    vec4 entry = texelFetch(entered, texel, 0);
+    float front = entry.w;
 #if ONE_INTERFACE
     bool none = front >= NOTHING;
 #else
@@ -46,6 +55,12 @@ void main() {
     out_radiance = none ? vec4(behind * through + emitted, 1.0) : vec4(0.0);
 #if APART
     out_transmittance = vec4(through, none ? 1.0 : 0.0);
+#if STRAIGHT_LIGHT
+    vec3 parameters = texelFetch(surface_parameters, texel, 0).rgb, passing = parameters.b * texelFetch(surface_color, texel, 0).rgb;
+    ObjectRow row = object_table_row(int(parameters.r + 0.5));
+    float cosine = clamp(-dot(entry.xyz, normalize(ray)), 0.0, 1.0);
+    if (!none) { out_radiance.rgb = emitted * leaving_fraction(passing, cosine, row.ior, parameters.g, vec2(row.clearcoat, row.clearcoat_roughness)); }
+#endif
 #else
     out_transmittance = none ? vec4(through, 1.0) : vec4(0.0);
 #endif

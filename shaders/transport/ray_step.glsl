@@ -433,20 +433,19 @@ int follow(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, int chann
 // along the straight ray; variance: of normals.
 vec3 with_lights(vec3 light, vec3 direction, PrimaryHit primary, vec3 emitted, float variance, bool starts_inside) {
 #if LIGHTS || EMISSION == 2
-    vec3 entering = vec3(1.0);
+    vec3 leaving = vec3(1.0);
     if (primary.object != AIR && !starts_inside) {
         Surface surface = surface_of(vec4(float(primary.object), primary.roughness, primary.transmission, variance));
 #if EMISSION == 2
         float cosine = clamp(-dot(primary.normal, direction), 0.0, 1.0);
-        entering = vec3(1.0 - interface_reflectance(cosine, surface.ior, surface.roughness)) * surface.transmission * primary.color;
-        entering *= 1.0 - coat_reflectance(surface.clearcoat, cosine);
+        leaving = leaving_fraction(surface.transmission * primary.color, cosine, surface.ior, surface.roughness, surface.clearcoat);
 #endif
 #if LIGHTS
         light += coated_highlights(primary.point, primary.normal, direction, surface, variance);
 #endif
     }
 #if EMISSION == 2
-    light += entering * emitted;
+    if (adaptive == 0) { light += leaving * emitted; }  // else shade/no_interface.frag has added it
 #endif
 #endif
     return min(light, vec3(NOTHING));

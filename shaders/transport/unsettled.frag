@@ -14,7 +14,7 @@
 
 uniform sampler2D bent_light;      // sum over the samples that hit an interface; alpha: how many of them there are so far
 uniform sampler2D bent_spread;     // r: sum of squared luminance; alpha: of the fractions that can be trusted
-uniform sampler2D average_light;   // sum over the samples that hit no interface; alpha: how many these are
+uniform sampler2D average_light;   // sum over the samples that hit no interface; alpha: how many these are; and what straight rays add
 uniform float samples;             // of a pixel
 uniform float most;                // that one may have which shows an interface alone
 uniform float difference;          // one sample is enough up to this second difference of light nearby, as a fraction of its mean

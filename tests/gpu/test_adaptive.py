@@ -38,10 +38,21 @@ def on_a_floor() -> tl.Scene:
     return dataclasses.replace(ball(), objects=[*ball().objects, floor])
 
 
-@pytest.mark.parametrize("scene", [ball(), on_a_floor()], ids=["alone", "on a floor"])
+def lit_from_behind() -> tl.Scene:
+    """A coated ball that scatters along straight rays, without a highlight."""
+    hazy = dataclasses.replace(GLASS, scattering=(0.1, 0.2, 0.15), emission=(0.1, 0.0, 0.2))
+    scene = ball(surface=tl.Surface(color=(0.7, 0.9, 0.9), clearcoat=0.5))
+    lights = [tl.DirectionalLight((0.0, 0.0, 1.0), (3.0, 3.0, 3.0))]
+    return dataclasses.replace(scene, objects=[dataclasses.replace(scene.objects[0], medium=hazy)], lights=lights)
+
+
+@pytest.mark.parametrize("scene", [ball(), on_a_floor(), lit_from_behind()], ids=["alone", "on a floor", "scattering"])
 def test_the_picture_is_that_of_all_samples(renderer: tl.Renderer, scene: tl.Scene) -> None:
-    few, every = (renderer.render(scene, SIZE, samples=16, adaptive=adaptive) for adaptive in (True, False))
-    assert traced(few) < 4.5
+    scattering = tl.SingleScattering() if scene.lights else None
+    few, every = (
+        renderer.render(scene, SIZE, samples=16, adaptive=adaptive, scattering=scattering) for adaptive in (True, False)
+    )
+    assert traced(few) < 5.5
     for name in ("transmittance", "optical_depth", "thickness", "coverage", "valid", "normals"):
         np.testing.assert_array_equal(few.arrays[name], every.arrays[name], err_msg=name)
     mean = every.radiance[every.coverage].mean()

@@ -95,7 +95,8 @@ class AdaptiveSampling:
     rule and its competitors: an empirical Bayes approach").
 
     The first round finds for every sample which pixels show an interface, and sums up the light of all others:
-    edges are as smooth as ever. The second traces rays; in each pixel, their mean replaces all of its
+    edges are as smooth as ever. Light that media add along straight rays is summed up there as well, through the first
+    interface. The second traces rays; in each pixel, their mean replaces all of its
     samples that hit an interface. Rays that a ground mirrors add their mean to the other samples. Opaque objects are
     visible through interfaces as the mean of all samples shows them; a ground alone, which is smooth, everywhere as the
     mean of a few.
@@ -134,7 +135,7 @@ class AdaptiveSampling:
                 self._add_opaque(job, samples)
             clock.outside()
         job.bending = True
-        leave_out = _left_out(job, mirror=job.mirror is not None, needed=_NEEDED)
+        leave_out = _left_out(job)
         looks = _looks(samples)
         for number, shift in enumerate(_central_first(samples)):
             if not number or number in looks:
@@ -144,8 +145,7 @@ class AdaptiveSampling:
                 clock.left = left
             self._trace_sample(job, number, shift, run_passes, leave_out)
             clock.bent(number)
-        # Of what media add along straight rays, and of layers behind the first interface, parts of pixels know nothing.
-        if samples > FIRST_LOOK and _left_out(job, mirror=False, needed=_NEEDED) != _DONE:
+        if samples > FIRST_LOOK:
             self._settle_isolated(job, samples, run_passes)
         job.bending = False
 
@@ -166,12 +166,13 @@ class AdaptiveSampling:
         """
         rough, targets, shown, most = _is_rough(job), job.targets, job.view.shift, ENLARGED_ACROSS**2
         light = read_floats(targets["bent"], 0, 4)
-        inside = (light[..., 3] > 0) & (read_floats(targets["average"], 0, 4)[..., 3] == 0)
+        others = read_floats(targets["average"], 0, 4)
+        inside, straight = (light[..., 3] > 0) & (others[..., 3] == 0), others[..., :3].sum(axis=-1) / samples
         inside &= min(targets.size) >= PIXEL_PARTS * ENLARGED_ACROSS
         settled, sums, drawn = np.zeros(inside.shape, bool), [light], 0
         limit = MOST_ROUGH_ENLARGED if rough else MOST_ENLARGED
         for number in range(ROUNDS_AGAIN):
-            level = light[..., :3].sum(axis=-1) / np.where(inside, light[..., 3], 1.0)
+            level = light[..., :3].sum(axis=-1) / np.where(inside, light[..., 3], 1.0) + straight
             spreads = isolated_pixels(level, inside) * (rough | ~settled)
             pixels = np.argwhere(spreads > 0.0)
             pixels = pixels[np.argsort(-spreads[tuple(pixels.T)], kind="stable")][: limit - drawn]
@@ -455,14 +456,12 @@ def _all_but(job: FrameJob, name: PassName) -> tuple[PassName, ...]:
     return tuple(step.name for step in job.plan.passes if step.name != name)
 
 
-def _left_out(job: FrameJob, *, mirror: bool, needed: tuple[PassName, ...]) -> tuple[PassName, ...]:
-    """Passes of a sample that tracing its rays does not need: from a ground's mirror image, too, or from interfaces."""
-    features = job.features
+def _left_out(job: FrameJob) -> tuple[PassName, ...]:
+    """Passes of a sample that tracing its rays does not need."""
     # Of what the ground mirrors, media without an interface may absorb some.
-    dims = mirror and any(not (body.has_interface or body.covers) for body in job.scene.bodies)
-    if features.emits or features.scatters or not features.one_interface or dims:
+    if job.mirror is not None and any(not (body.has_interface or body.covers) for body in job.scene.bodies):
         return _DONE
-    return tuple(step.name for step in job.plan.passes if step.name not in needed)
+    return tuple(step.name for step in job.plan.passes if step.name not in _NEEDED)
 
 
 class _Clock:

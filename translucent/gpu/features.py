@@ -165,6 +165,11 @@ class FrameFeatures:
         """True if the method steps through the intervals."""
         return self.plan.method.marches
 
+    @property
+    def straight_light(self) -> bool:
+        """True if the light that media add is found along straight rays, where traced rays do not find it."""
+        return self.scatters or self.marches
+
     @cached_property
     def emits(self) -> bool:
         """True if any medium emits light."""

@@ -88,6 +88,10 @@ _PLAIN_SAMPLERS = (
     "opaque_axial_depth",
     "opaque_radiance",
     "seen_map",
+    "surface_parameters",
+    "surface_color",
+    "object_table",
+    "reflectance_table",
 )
 
 
@@ -106,13 +110,18 @@ class NoInterface:
         maps = job.resources.background_textures(job.scene.environment)
         emitted, through, *_ = job.targets["result"].color_attachments
         textures = {"emitted_radiance_sum": emitted, "straight_transmittance": through, **maps}
-        textures["entered"] = job.targets["entered"].color_attachments[0]
+        textures["entered"], parameters, color = job.targets["entered"].color_attachments
+        straight = bool(job.covered) and job.bent_apart and job.features.straight_light
+        if straight:
+            textures |= {"surface_parameters": parameters, "surface_color": color, "object_table": job.object_table()}
+            textures["reflectance_table"] = job.resources.textures.reflectance
         if not job.features.one_interface:
             textures["left"] = job.targets["left"].color_attachments[0]
         if job.features.has_opaque:
             textures["opaque_axial_depth"], textures["opaque_radiance"] = job.targets["opaque"].color_attachments
         self._variants.bind(**textures)
         switches = {"OPAQUE": job.features.has_opaque, "SEEN_MAP": bool(maps), "REST": not job.covered}
+        switches |= {"STRAIGHT_LIGHT": straight, **coat_switches(job.scene.bodies if straight else ())}
         if job.covered:
             switches |= {"ONE_INTERFACE": job.features.one_interface, "APART": job.bent_apart}
             job.gl.enable_only(blending | moderngl.DEPTH_TEST)
@@ -129,6 +138,8 @@ class NoInterface:
             if job.sample == 0:  # the rest is the same in all samples
                 set_uniform(program, "weight", float(job.samples))
                 self._variants.draw_rest(job, program, framebuffer, top_first=True)
+        if straight:
+            textures["object_table"].release()
         job.gl.depth_func = "<"
 
 

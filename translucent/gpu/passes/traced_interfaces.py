@@ -15,7 +15,6 @@ import numpy.typing as npt
 from translucent.formulas.sampling import FOOTPRINT_STEP, MOST_POINTS, sobol_points
 from translucent.gpu.constants import ENLARGED_ACROSS
 from translucent.gpu.context import require_interfaces
-from translucent.gpu.features import FrameFeatures
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.interfaces import NoInterface
 from translucent.gpu.passes.opaque import bind_light, interface_shadow_switches
@@ -251,7 +250,8 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
         **ray_switches(job),
         "TEXTURED": job.features.textured,
         "PAINTED": any(any(look_switches(body).values()) for body in scene.bodies),
-        "EMISSION": _emission(job.features),
+        # 1: traced rays find what media emit; 2: straight rays have found that, and what media scatter.
+        "EMISSION": 2 if job.features.straight_light else int(job.features.emits),
         "LAYERED": any(treatment_of(body) is Treatment.LAYER for body in scene.bodies),
         "DIFFUSED": diffused,
         "MICROFACETS": mirror or rough,
@@ -271,13 +271,6 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
         "FOOTPRINTS": environment.kind == "image",
         **coat_switches(scene.objects),
     }
-
-
-def _emission(features: FrameFeatures) -> int:
-    """0 if no medium emits or scatters light along rays; 1 if traced rays find that light, 2 if straight ones have."""
-    if features.emits and not features.scatters:
-        return 1
-    return 2 if features.scatters or features.marches else 0
 
 
 def _mirroring(scene: Scene, mirror: Mirror) -> dict[str, Any]:

@@ -166,7 +166,7 @@ def walk_switches(features: FrameFeatures) -> dict[str, bool | int]:
         "UNION": features.scene.overlap == "union",
         "PRIORITY": features.scene.overlap == "priority",
         "EMISSION": features.emits,
-        "SCATTER": features.scatters or features.marches,
+        "SCATTER": features.straight_light,
         "MARCH": features.marches,
         "VARIES": features.varies,
         "SCATTERS_AGAIN": features.scatters_again,
