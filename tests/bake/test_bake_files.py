@@ -198,6 +198,7 @@ FULL = """
 import resource, signal, sys
 from pathlib import Path
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+sys.dont_write_bytecode = True  # modules that are imported below the limit would be cut off in the cache
 import numpy as np
 sys.path.insert(0, {tests!r})
 import conftest, translucent as tl

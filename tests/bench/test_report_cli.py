@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import signal
 import sys
-import time
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -275,20 +276,27 @@ def test_a_limit_ends_measuring_and_what_was_not_measured_is_named(
 ) -> None:
     from translucent.bench.methods import MethodComparison
 
+    now, left = [0.0], list[float]()
+
     def patient(self: MethodComparison, bench: Any, case: Any) -> Any:
-        if case.name == "model bear":
-            time.sleep(60.0)
+        if case.name == "model bear":  # takes until the alarm
+            left.append(signal.getitimer(signal.ITIMER_REAL)[0])
+            now[0] += 3600.0
+            signal.raise_signal(signal.SIGALRM)
         return self.blank(bench, case)
 
     monkeypatch.setattr(MethodComparison, "measure", patient)
-    result = run("knot", "bear", "shell", "-o", tmp_path, "--limit", "0.5", *SMALL)
+    monkeypatch.setattr("translucent.commands.report.time", SimpleNamespace(monotonic=lambda: now[0]))
+    result = run("knot", "bear", "shell", "-o", tmp_path, "--limit", "3600", *SMALL)
     assert result.code == 0
+    assert len(left) == 1
+    assert 0.0 < left[0] <= 3600.0
     assert result.err.splitlines() == [
         "preparing the report: the first measurement takes the longest",
         *(f"reading {name}" for name in ("knot", "bear", "shell")),
         "measuring 1 of 3: case model knot",
         "measuring 2 of 3: case model bear",
-        "warning: not measured within 0.5 s: case model bear, case model shell",
+        "warning: not measured within 3600 s: case model bear, case model shell",
     ]
     made = Report.from_json((tmp_path / "report.json").read_text())
     assert [case.name for case in made.cases] == ["model knot"]

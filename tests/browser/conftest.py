@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.browser.pages import CHROMIUM_OPTIONS, WebPage, find_chromium
+from tests.browser.pages import CHROMIUM_OPTIONS, MILLISECONDS, WebPage, find_chromium
 from tests.browser.thickness import prepare
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def chromium() -> Iterator[Browser]:
         "playwright.sync_api", reason="Playwright is not installed (dependency group test)"
     )
     with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=executable, args=CHROMIUM_OPTIONS)
+        browser = started.chromium.launch(executable_path=executable, args=CHROMIUM_OPTIONS, timeout=MILLISECONDS)
         yield browser
         browser.close()
 

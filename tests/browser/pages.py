@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from tests.processes import PATIENCE
+
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
@@ -31,6 +33,9 @@ CHROMIUM_OPTIONS = [
     "--disable-sync",
     "--disable-dev-shm-usage",
 ]
+
+#: Time after which a page that does not get ready fails its test.
+MILLISECONDS = 1e3 * PATIENCE
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
@@ -67,6 +72,7 @@ class WebPage:
         viewport = {"width": size[0], "height": size[1]}
         self._context = browser.new_context(viewport=viewport, device_scale_factor=ratio, offline=True, **context)  # type: ignore[arg-type]
         self.page = self._context.new_page()
+        self.page.set_default_timeout(MILLISECONDS)
         self.errors: list[str] = []
         self.messages: list[str] = []
         self.page.on("console", self._hear)

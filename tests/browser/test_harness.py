@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.browser.pages import WebPage, decoded, encoded
+from tests.processes import until
 
 TOOLS = Path(__file__).with_name("tools.js")
 
@@ -23,9 +24,10 @@ def test_arrays_come_and_go_as_they_are(web_page: WebPage, web_dist: Path) -> No
 def test_errors_of_a_page_are_heard(web_page: WebPage, tmp_path: Path) -> None:
     (tmp_path / "page.html").write_text("<script>console.error('broken'); undefined_name();</script>", encoding="utf-8")
     web_page.open(tmp_path / "page.html")
-    web_page.page.wait_for_load_state()
-    assert web_page.errors[0] == "broken"
-    assert "undefined_name" in web_page.errors[1]
+    until(lambda: web_page.run("() => true") and len(web_page.errors) == 2)
+    one, other = sorted(web_page.errors, key=len)
+    assert one == "broken"
+    assert "undefined_name" in other
     web_page.errors.clear()
 
 

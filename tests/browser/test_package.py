@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
+from tests.browser.pages import MILLISECONDS
 from translucent.cli import cli
 
 WEB = Path(__file__).resolve().parents[2] / "web"
@@ -104,6 +105,7 @@ def test_the_tarball_is_all_that_a_page_needs(chromium: Any, contents: dict[str,
     context = chromium.new_context(viewport={"width": 64, "height": 64})
     try:
         page = context.new_page()
+        page.set_default_timeout(MILLISECONDS)
         page.route(f"{ORIGIN}/**", serve)
         page.goto(f"{ORIGIN}/")
         page.wait_for_function("() => globalThis.thickness")
@@ -143,6 +145,7 @@ def test_an_import_map_needs_no_build(chromium: Any, web_dist: Path, example: st
     errors: list[str] = []
     try:
         page = context.new_page()
+        page.set_default_timeout(MILLISECONDS)
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.route(f"{ORIGIN}/**", serve)
         page.goto(f"{ORIGIN}/examples/{example}/index.html")

@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from tests.browser.pages import WebPage
+from tests.processes import until
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "web" / "examples" / "react" / "index.html"
 
@@ -29,8 +30,7 @@ def test_a_scene_is_measured_before_each_picture(web_page: WebPage, web_dist: Pa
     page.evaluate("() => { globalThis.first = pass; }")
     assert hue(web_page) == pytest.approx(WINE, abs=0.1)
     page.mouse.click(150, 75)
-    page.wait_for_timeout(300)
-    assert hue(web_page) == pytest.approx(WHISKY, abs=0.1)
+    until(lambda: hue(web_page) == pytest.approx(WHISKY, abs=0.1))
     assert page.evaluate("() => pass === first")
 
 

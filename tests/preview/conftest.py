@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.preview.waiting import SIZE, environment, wait
+from tests.processes import PATIENCE
 from translucent.planning.scattering import Diffusion
 from translucent.preview import worker
 from translucent.preview.document import Display, Document, Model
@@ -71,7 +72,7 @@ def display() -> Iterator[str]:
         yield f":{number}"
     finally:
         server.terminate()
-        server.wait(10)
+        server.wait(PATIENCE)
 
 
 Preview = Callable[..., subprocess.CompletedProcess[str]]
@@ -86,6 +87,6 @@ def preview(display: str, tmp_path: Path) -> Preview:
         command = [sys.executable, "-m", "translucent", "preview", *arguments, "--size", "640x480", "--json"]
         command += ["--script", str(tmp_path / "script.toml"), "--screenshot", str(tmp_path / "window.png")]
         own = environment(display, tmp_path)
-        return subprocess.run(command, capture_output=True, text=True, timeout=120, env=own, check=False)
+        return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, env=own, check=False)
 
     return run

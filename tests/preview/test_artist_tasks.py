@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.preview.waiting import environment
+from tests.processes import PATIENCE
 
 TOOL = Path(__file__).resolve().parents[2] / "tools" / "preview_tasks.py"
 NAMES = ("distance in mm", "find a key")
@@ -21,6 +22,6 @@ NAMES = ("distance in mm", "find a key")
 def test_a_distance_is_typed_and_a_key_found(display: str, tmp_path: Path) -> None:
     command = [sys.executable, str(TOOL), *NAMES, "--folder", str(tmp_path), "--size", "1000x700"]
     own = environment(display, tmp_path)
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, env=own, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, env=own, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert [line[:22].strip() for line in done.stdout.splitlines()] == list(NAMES)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -16,6 +15,7 @@ import pytest
 
 import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
+from tests.processes import PATIENCE, until
 from translucent import assets as data
 from translucent.geometry import normals
 from translucent.geometry.mesh import Mesh
@@ -62,7 +62,7 @@ def near(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
     go = threading.Event()
 
     def call(_: Pool, task: Any, work: Callable[..., Any], *arguments: Any, **_urgency: Any) -> Any:
-        go.wait(60.0)
+        go.wait(PATIENCE)
         return work(*arguments)
 
     monkeypatch.setattr(Pool, "call", call)
@@ -233,9 +233,7 @@ def test_another_process_tells_what_it_has_compiled(work: Workspace) -> None:
         plans = [renderer.plan(scene), renderer.plan(scene, tl.DepthPeeling())]
         compiler.device = renderer.gpu.context.renderer
     compiler.request("", plans, found.append)
-    while not found:
-        compiler.lane.poll(pytest.fail)
-        time.sleep(0.002)
+    until(lambda: compiler.lane.poll(pytest.fail) or found)
     compiler.lane.close()
     assert found == [Compiled(frozenset().union(*(needed(plan)[0] for plan in plans)))]
 
@@ -245,9 +243,7 @@ def test_another_device_is_of_no_use(work: Workspace, near: threading.Event) -> 
     compiler, found = Compiler(work.pool), list[Compiled]()
     compiler.device = "a card from the future"
     compiler.request("", [], found.append)
-    while not found:
-        compiler.lane.poll(pytest.fail)
-        time.sleep(0.002)
+    until(lambda: compiler.lane.poll(pytest.fail) or found)
     compiler.lane.close()
     assert found[0].programs is None
     assert "but the window uses a card from the future" in found[0].problem
@@ -355,7 +351,7 @@ def test_normals_that_two_lanes_ask_for_are_made_once(monkeypatch: pytest.Monkey
 
         def call(self, task: Task, work: object, mesh: Mesh, **_: object) -> np.ndarray:
             asked.append(work)
-            may_end.wait(20.0)
+            may_end.wait(PATIENCE)
             return np.zeros((*mesh.faces.shape, 3), np.float32)
 
     monkeypatch.setattr(preparation, "PATIENCE", 0.001)
@@ -367,7 +363,7 @@ def test_normals_that_two_lanes_ask_for_are_made_once(monkeypatch: pytest.Monkey
     tasks[2].cancel()
     may_end.set()
     for thread in threads:
-        thread.join(20.0)
+        thread.join(PATIENCE)
     assert asked == [made_normals]
     assert has_drawn_normals(mesh)
     assert [task.error for task in tasks] == [None] * 3

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import threading
 import time
 from pathlib import Path
 
@@ -79,7 +80,7 @@ def slow(path: str) -> None:
 def test_a_file_that_nobody_waits_for_is_not_left_half_written(
     work: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(worker, "PARTING", 0.3)
+    monkeypatch.setattr(worker._Worker, "stop", lambda _: False)  # it does not report for long
     path = tmp_path / "a.png"
     work.export(str(path), slow)
     task = work.lanes["write"].task
@@ -101,18 +102,19 @@ def test_a_file_in_the_background_that_cannot_be_written_is_told(work: Workspace
 
 
 def test_a_window_that_is_closed_finishes_its_file(tmp_path: Path) -> None:
-    work = Workspace(Document(Model("sphere")))
+    work, begun = Workspace(Document(Model("sphere"))), threading.Event()
     path = tmp_path / "map.npy"
 
     def writes(to: str) -> None:
-        time.sleep(1.5)
+        begun.set()
+        time.sleep(0.7)  # longer than other work is waited for
         Path(to).write_bytes(b"whole")
 
     work.write(str(path), lambda _: writes(str(path)))
-    wait(work, lambda: work.loaded is not None)
+    wait(work, begun.is_set)
     work.close()
     assert path.read_bytes() == b"whole"
-    assert work.ended
+    assert work.lanes["write"].ended
 
 
 def hard(path: str) -> None:
@@ -156,6 +158,6 @@ def test_a_window_closed_while_it_saves_leaves_the_file_whole_or_as_it_was(tmp_p
     assert task is not None
     wait(work, lambda: task.share == 0.5)
     work.close()
-    assert work.ended
+    assert work.lanes["write"].ended
     assert [one.name for one in tmp_path.iterdir()] == ["a.png"]
     assert path.read_bytes() in (b"whole", b"half")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import pytest
 
 import translucent as tl
 from tests.preview.waiting import wait
+from tests.processes import until
 from translucent.preview import library
 from translucent.preview.actions import Assign, ChoosePreset, History, Open, apply, preset_material
 from translucent.preview.document import Document, Material, Orbit
@@ -36,12 +36,14 @@ def lane() -> Iterator[Lane]:
 
 def settle(cache: ThumbnailCache, ask: Callable[[], Any]) -> Any:
     """Answer of a cache to a request that is made in every frame."""
-    end = time.monotonic() + 10.0
-    while (found := ask()) is None and time.monotonic() < end:
+
+    def answer() -> Any:
         cache.begin_frame(idle=True)
         cache.lane.poll(print)
-        time.sleep(0.001)
-    return found
+        return ask()
+
+    until(lambda: answer() is not None)
+    return ask()
 
 
 def two_bodies() -> Loaded:
@@ -94,12 +96,18 @@ def test_few_are_read_in_a_frame_and_what_cannot_be_made_has_no_picture(lane: La
         cache.picture(str(number), str(number))
     cache.begin_frame(idle=True)
     assert len(cache._queue) == 4, "a folder of 500 files stops no frame"
-    for _ in range(20):
+
+    def tried() -> bool:
         cache.picture("0", "0")
         cache.begin_frame(idle=True)
         lane.poll(print)
-        time.sleep(0.002)
-    assert asked == ["0"], "it is tried once"
+        return "0" in cache._known
+
+    until(tried)
+    for _ in range(3):
+        assert tried()
+        assert lane.task is None, "it is tried once"
+    assert asked == ["0"]
 
 
 def test_a_ball_fills_its_picture_on_the_default_stage(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from tests.preview.waiting import wait
+from tests.processes import PATIENCE
 from translucent.preview import scenes
 from translucent.preview import scenes as staging
 from translucent.preview.actions import OrbitBy, SetField
@@ -49,7 +50,7 @@ def test_the_one_before_is_on_show_until_a_file_is_read(
 
     def slow(name: str) -> Any:
         asked.append(name)
-        read.wait(20.0)
+        read.wait(PATIENCE)
         return original(name)
 
     monkeypatch.setattr(staging, "named_environment", slow)

@@ -11,6 +11,7 @@ import pytest
 
 import translucent as tl
 from tests.preview.waiting import SIZE, wait
+from tests.processes import PATIENCE
 from translucent.preview import measuring, workspace
 from translucent.preview.actions import OrbitBy, SetField
 from translucent.preview.measuring import crossing, measure
@@ -81,7 +82,7 @@ def test_measuring_waits_for_what_the_picture_needs_and_is_cancelled_when_things
     monkeypatch.setattr(work, "measure", lambda scene, *_: begun.append(scene))
     wait(work, lambda: work.loaded is not None and not work.prepares)
     reads = threading.Event()
-    work.lanes["light"].start("setting the stage", lambda _: reads.wait(20.0), lambda _: None)
+    work.lanes["light"].start("setting the stage", lambda _: reads.wait(PATIENCE), lambda _: None)
     assert state.draw(SIZE)
     assert not begun
     reads.set()

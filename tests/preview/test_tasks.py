@@ -8,6 +8,7 @@ import weakref
 
 import numpy as np
 
+from tests.processes import PATIENCE, until
 from translucent.preview.tasks import Lane, Task
 
 
@@ -17,7 +18,7 @@ def test_a_task_that_waits_and_is_cancelled_lets_go_of_what_it_holds() -> None:
 
     def long(_: Task) -> None:
         begun.set()
-        end.wait(20.0)
+        end.wait(PATIENCE)
 
     def ask() -> weakref.ref[np.ndarray]:
         scene = np.zeros(8)
@@ -25,15 +26,14 @@ def test_a_task_that_waits_and_is_cancelled_lets_go_of_what_it_holds() -> None:
         return weakref.ref(scene)
 
     lane.start("long", long, print)
-    assert begun.wait(20.0)
+    assert begun.wait(PATIENCE)
     waiting = [ask() for _ in range(5)]
     gc.collect()
     assert [one() is None for one in waiting] == [True] * 4 + [False]
     task = lane.task
     assert task is not None
     end.set()
-    while not task.finished:
-        pass
+    until(lambda: task.finished)
     lane.poll(print)
     assert len(done) == 1
     lane.close()

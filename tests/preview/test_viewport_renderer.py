@@ -15,6 +15,7 @@ import pytest
 
 import translucent as tl
 from tests.preview.waiting import SIZE, finish, pixels, wait
+from tests.processes import PATIENCE
 from translucent import assets as data
 from translucent.diffusion import irradiance_maps
 from translucent.geometry.solids import Sphere
@@ -110,7 +111,7 @@ def test_samples_wait_for_an_environment_that_is_being_read(view: ViewportRender
     finish(view, work)
     assert view.viewport.steps(0) > 1
     reads = threading.Event()
-    work.lanes["light"].start("reading the environment", lambda _: reads.wait(60.0), lambda _: None)
+    work.lanes["light"].start("reading the environment", lambda _: reads.wait(PATIENCE), lambda _: None)
     view.viewport.restart()
     for _ in range(4):
         assert view.draw(work, SIZE)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.processes import PATIENCE
 from translucent.cli import main
 from translucent.preview.session import load_session
 
@@ -170,7 +171,7 @@ def test_a_display_that_does_not_answer_is_told() -> None:
     pytest.importorskip("imgui_bundle")
     command = [sys.executable, "-m", "translucent", "preview", "leaf"]
     environment = {**os.environ, "DISPLAY": ":987", "WAYLAND_DISPLAY": ""}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, env=environment, check=False)
     assert done.returncode == 1
     assert "no window can be opened on display ':987'" in done.stderr
 
@@ -224,7 +225,7 @@ def test_a_window_that_is_closed_while_work_is_under_way_ends_well(display: str,
     )
     environment = {**os.environ, "DISPLAY": display}
     command = [sys.executable, "-c", code, str(tmp_path / "window.png")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, env=environment, check=False)
     assert done.returncode == 0, done.stderr
 
 
@@ -248,7 +249,7 @@ def test_ctrl_c_within_a_table_is_raised(display: str) -> None:
     )
     environment = {**os.environ, "DISPLAY": display}
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=environment, check=False
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE, env=environment, check=False
     )
     assert done.stdout.splitlines()[-1:] == ["interrupted"], done.stderr
 
@@ -269,7 +270,7 @@ def test_the_first_picture_waits_for_nobody(display: str) -> None:
     )
     environment = {**os.environ, "DISPLAY": display}
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=environment, check=False
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE, env=environment, check=False
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "drawn", done.stdout

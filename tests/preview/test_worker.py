@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 import translucent as tl
+from tests.processes import PATIENCE, runs, until
 from translucent.geometry.mesh import Mesh
 from translucent.geometry.solids import Box
 from translucent.preview import worker
@@ -128,6 +129,7 @@ def test_a_process_that_nobody_waits_for_ends(task: Task, pool: Pool, monkeypatc
 def test_work_that_reports_ends_and_its_process_goes_on(
     task: Task, pool: Pool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(worker, "PARTING", PATIENCE)
     monkeypatch.setattr(task, "report", cancelling(task))
     with pytest.raises(CancelledError):
         pool.call(task, steps)
@@ -240,19 +242,8 @@ def test_a_window_that_is_killed_leaves_no_process_and_no_file(tmp_path: Path) -
             assert window.poll() is None
         window.kill()
         window.wait()
-    end = time.monotonic() + 20.0
-    while runs(int(told)):
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    until(lambda: not runs(int(told)))
     assert not list(folder.iterdir())
-
-
-def runs(process: int) -> bool:
-    """True if there is such a process, and it has not ended."""
-    try:
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 class Fake:
@@ -268,7 +259,7 @@ class Fake:
 
     def answer(self, task: Task) -> tuple[bool, Any]:
         self.begun.append(task.name)
-        self.go[task.name].wait(20.0)
+        self.go[task.name].wait(PATIENCE)
         return False, task.name
 
     def forget(self) -> None:
@@ -282,13 +273,7 @@ def test_what_is_urgent_goes_first_and_never_waits_for_what_is_not(monkeypatch: 
     monkeypatch.setattr(worker, "_Worker", Fake)
     monkeypatch.setattr(worker, "MOST", 2)
     monkeypatch.setattr(worker, "PATIENCE", 0.01)
-    pool, begun, end = Pool(), list[str](), time.monotonic() + 20.0
-
-    def until(done: Callable[[], bool]) -> None:
-        while not done():
-            assert time.monotonic() < end
-            time.sleep(0.001)
-
+    pool, begun = Pool(), list[str]()
     order = {"bake": Urgency.LATER, "truth": Urgency.LATER, "probe": Urgency.ANSWER, "shaders": Urgency.PICTURE}
     go = {name: threading.Event() for name in order}
     threads = []
@@ -305,4 +290,4 @@ def test_what_is_urgent_goes_first_and_never_waits_for_what_is_not(monkeypatch: 
     assert begun == ["bake", "shaders", "probe", "truth"]
     go["truth"].set()
     for thread in threads:
-        thread.join(20.0)
+        thread.join(PATIENCE)

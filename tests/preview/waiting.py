@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.processes import PATIENCE, until
 from translucent.preview.viewport_renderer import ViewportRenderer
 from translucent.preview.workspace import Workspace
 
@@ -22,18 +23,14 @@ def environment(display: str, folder: Path) -> dict[str, str]:
     return {"MESA_SHADER_CACHE_DIR": shaders, **os.environ, **own}
 
 
-def wait(work: Workspace, done: Callable[[], object], seconds: float = 60.0) -> None:
+def wait(work: Workspace, done: Callable[[], object]) -> None:
     """Until something is so, with the background's results taken over."""
-    end = time.monotonic() + seconds
-    while not done():
-        assert time.monotonic() < end, "it takes too long"
-        work.update()
-        time.sleep(0.002)
+    until(lambda: done() or work.update())
 
 
 def finish(view: ViewportRenderer, work: Workspace) -> None:
     """Draw until nothing is left to draw, or to be compiled or solved for it."""
-    end = time.monotonic() + 60.0
+    end = time.monotonic() + PATIENCE
     lanes = work.compiler.lane, work.lanes["diffuse"], work.lanes["trace"]
     while view.draw(work, SIZE) | (busy := work.relights or any(lane.task is not None for lane in lanes)):
         assert time.monotonic() < end, "the picture is never done"

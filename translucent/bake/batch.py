@@ -360,10 +360,14 @@ def _do(task: Callable[[Item], Result], item: Item) -> Result:
     """Run a task in a worker process. Where it has tidied up since the process is to end, that ends; a pool would go
     on.
     """
+    global _working
     try:
+        _working = True
         return task(item)
     except SystemExit:
         os._exit(143)
+    finally:
+        _working = False
 
 
 def _begin() -> None:
@@ -394,8 +398,14 @@ def _follow_parent() -> None:
     os._exit(143)
 
 
+#: True while a task runs, which has to tidy up before this worker process ends.
+_working = False
+
+
 def _end(*_: Any) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough; a second one would disturb the tidying
+    if not _working:
+        os._exit(143)  # a pool that sends a result catches all that is raised, and goes on
     sys.exit(143)
 
 

@@ -387,7 +387,7 @@ class _Worker:
             if pictures:
                 pass
             elif IDLE is not None:
-                os.sched_setscheduler(self.process.pid, IDLE, os.sched_param(0))
+                _make_idle(self.process.pid, IDLE)
             elif hasattr(os, "setpriority"):
                 os.setpriority(os.PRIO_PROCESS, self.process.pid, NICENESS)
         self.pictures = pictures
@@ -462,6 +462,14 @@ class _Worker:
             self.process.kill()
             self.process.join()  # only then it lets go of the file that it has half written
             self._channel.pipe.close()
+
+
+def _make_idle(process: int, policy: int) -> None:
+    """Give a process and its threads a policy, on a busy machine also those of libraries that it has begun by now."""
+    os.sched_setscheduler(process, policy, os.sched_param(0))  # of the first thread, and of all that it begins
+    for thread in os.listdir(f"/proc/{process}/task"):
+        with suppress(ProcessLookupError):  # it has ended
+            os.sched_setscheduler(int(thread), policy, os.sched_param(0))
 
 
 #: Takes the progress of the work of this process; None in the window's own.
