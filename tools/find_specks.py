@@ -1,6 +1,7 @@
 """Specks in pictures of media: isolated pixels far off their neighbors, over presets, meshes and stages.
 
-    python tools/find_specks.py --presets jade,soap --meshes cube,spike --out out/specks
+    python tools/find_specks.py
+    python tools/find_specks.py --presets jade,soap --meshes cube,spike --every --out out/specks
 
 A pixel is isolated if it is brighter than each of its eight neighbors, or darker, by half as much as it is off their
 median, and that is more than four times the spread of the 24 around it: lines, edges, corners and flanks of highlights
@@ -14,7 +15,9 @@ Prints a row for each picture with isolated pixels, and writes their pictures.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +27,7 @@ from scipy.ndimage import binary_erosion
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.geometry.solids import Box, Sphere, revolve
+from translucent.scene.camera import Window
 from translucent.scene.showcase import showcase
 
 Array = npt.NDArray[np.float64]
@@ -101,37 +105,63 @@ def main() -> None:
     """Render, and count."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--presets", default=",".join(tl.presets()))
-    parser.add_argument("--meshes", default=",".join(MESHES))
-    parser.add_argument("--stages", default="none")
-    parser.add_argument("--width", type=int, default=160)
+    parser.add_argument("--meshes", default="smooth,cube,thin,spike,hollow,coarse", help="also: fine, 90,000 triangles")
+    parser.add_argument("--stages", default="night,studio,daylight", help="none: bodies in the air")
+    parser.add_argument("--every", action="store_true", help="show all pairs on every stage, not on one stage in turn")
+    parser.add_argument("--width", type=int, default=96)
     parser.add_argument("--samples", type=int, default=16)
     parser.add_argument("--size", type=float, default=0.06, help="longest side of the bodies in metres")
     parser.add_argument("--out", type=Path, default=None, help="folder for pictures with specks")
     options = parser.parse_args()
-    size, total = (options.width, options.width * 3 // 4), 0
+    size, pictures, totals = (options.width, options.width * 3 // 4), 0, np.zeros(2, int)
     with tl.Renderer() as renderer:
-        for shape in options.meshes.split(","):
+        for i, shape in enumerate(options.meshes.split(",")):
             mesh = MESHES[shape]()
             extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
             mesh = tl.Mesh(mesh.vertices * (options.size / extent), mesh.faces)
-            for stage in options.stages.split(","):
-                for name in options.presets.split(","):
-                    scene = showcase(mesh, tl.preset(name), size, stage=None if stage == "none" else stage)
-                    frame = renderer.render(scene, size, samples=options.samples)
-                    light, covered = np.asarray(frame.radiance, np.float64), np.asarray(frame.coverage)
-                    found = isolated(light, covered)
-                    if not found.any():
-                        continue
-                    finer = renderer.render(scene, (FINER * size[0], FINER * size[1]), samples=options.samples)
-                    there = found & confirmed(light, np.asarray(finer.radiance, np.float64))
-                    total += int(found.sum() - there.sum())
-                    row, column = np.argwhere(found)[0]
-                    counts = f"{found.sum() - there.sum()} specks, {there.sum()} of the scene"
-                    print(f"{shape} {stage} {name}: {counts}, the first at {column}, {row}", flush=True)
-                    if options.out is not None:
-                        options.out.mkdir(parents=True, exist_ok=True)
-                        frame.save(options.out / f"{shape}-{stage}-{name}.png")
-    print(f"{total} specks in all")
+            for (j, name), (k, stage) in product(*map(_numbered, (options.presets, options.stages))):
+                if not options.every and (i + j + k) % len(options.stages.split(",")):
+                    continue
+                scene = showcase(mesh, tl.preset(name), size, stage=None if stage == "none" else stage)
+                frame = renderer.render(scene, size, samples=options.samples)
+                light, covered = np.asarray(frame.radiance, np.float64), np.asarray(frame.coverage)
+                found = np.argwhere(isolated(light, covered)).tolist()
+                specks = _specks(renderer, scene, light, options.samples, found)
+                pictures, totals = pictures + 1, totals + (len(specks), len(found) - len(specks))
+                if found:
+                    places = ", ".join(f"{column} {row}" for row, column in specks)
+                    print(
+                        f"{shape} {stage} {name}: {len(found)} isolated pixels, specks: {places or 'none'}", flush=True
+                    )
+                if found and options.out is not None:
+                    options.out.mkdir(parents=True, exist_ok=True)
+                    frame.save(options.out / f"{shape}-{stage}-{name}.png")
+    print(f"{totals[0]} specks in {pictures} pictures, and {totals[1]} isolated pixels of the scenes")
+
+
+def _numbered(names: str) -> list[tuple[int, str]]:
+    """Names that are separated by commas, with their numbers."""
+    return list(enumerate(names.split(",")))
+
+
+def _specks(
+    renderer: tl.Renderer, scene: tl.Scene, light: Array, samples: int, found: list[list[int]]
+) -> list[list[int]]:
+    """Rows and columns of the isolated pixels that the truth does not confirm: first a part of it, then all of it."""
+    height, width, _ = light.shape
+    camera, size, side = scene.camera, (FINER * width, FINER * height), 2 * RIM + 1
+    left = []
+    for row, column in found:
+        window = Window(FINER * (column - RIM), FINER * (row - RIM), size)
+        part = dataclasses.replace(scene, camera=dataclasses.replace(camera, window=window))
+        fine = renderer.render(part, (FINER * side, FINER * side), samples=samples).radiance
+        around = light[row - RIM : row + RIM + 1, column - RIM : column + RIM + 1]
+        if not confirmed(around, np.asarray(fine, np.float64))[RIM, RIM]:
+            left.append([row, column])
+    if left:
+        there = confirmed(light, np.asarray(renderer.render(scene, size, samples=samples).radiance, np.float64))
+        left = [[row, column] for row, column in left if not there[row, column]]
+    return left
 
 
 if __name__ == "__main__":
