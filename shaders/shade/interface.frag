@@ -43,7 +43,7 @@ layout(location = 2) out vec4 out_color;  // w: fraction of the light of the env
 void main() {
     // All that takes derivatives comes first: they are undefined where a neighbor has been discarded.
     vec3 normal = mapped_normal(normalize(world_normal), from_eye, surface_uv);
-    float variance = packed_variance(normal_variance(SURFACE_TEXTURES == 1 ? normal : world_normal));
+    float variance = packed_variance(normal_variance(SURFACE_TEXTURES == 1 ? normal : world_normal, from_eye).xyz);
     float roughness = surface_roughness * textured_roughness(surface_uv).g;
     float transmission = surface_color.w * textured_transmission(surface_uv);
 #if !BACK
