@@ -46,7 +46,7 @@ def lit_from_behind() -> tl.Scene:
     return dataclasses.replace(scene, objects=[dataclasses.replace(scene.objects[0], medium=hazy)], lights=lights)
 
 
-@pytest.mark.parametrize("scene", [ball(), on_a_floor(), lit_from_behind()], ids=["alone", "on a floor", "scattering"])
+@pytest.mark.parametrize("scene", [on_a_floor(), lit_from_behind()], ids=["on a floor", "scattering"])
 def test_the_picture_is_that_of_all_samples(renderer: tl.Renderer, scene: tl.Scene) -> None:
     scattering = tl.SingleScattering() if scene.lights else None
     few, every = (
