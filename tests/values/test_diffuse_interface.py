@@ -53,6 +53,10 @@ def test_polished_interfaces_reflect_diffuse_light_as_walsh_found(ior: float) ->
     # Light through the interface is the same both ways: (1 - r_inside) n^2 = 1 - r_outside.
     assert found.reflected == pytest.approx(1 - (1 - walsh(ior)) / ior**2, abs=QUADRATURE)
     assert found.leaving == 1 - found.reflected
+    # From the other side, inside and outside change places.
+    inverse = diffuse_interface(1 / ior)
+    assert inverse.entering == pytest.approx(found.leaving, abs=QUADRATURE)
+    assert inverse.leaving == pytest.approx(found.entering, abs=QUADRATURE)
 
 
 @pytest.mark.parametrize("ior", IORS)

@@ -33,6 +33,7 @@ from translucent.diffusion.first_events import (
     tails,
 )
 from translucent.diffusion.grid import BodyGrid
+from translucent.diffusion.interfaces import BodyInterface
 from translucent.diffusion.lit_body import lit_body
 from translucent.diffusion.solution import BodySystem, _ChannelSystem
 from translucent.diffusion.walls import Walls
@@ -307,7 +308,8 @@ def test_the_system_is_symmetric_and_positive() -> None:
     grid = ball_grid(10)
     dense = even_densities(grid)
     paths, scattered = diffuse_paths(grid, dense, 1.4), np.ones(len(grid.points))
-    channel = _ChannelSystem(grid, 1.4, 0.0, 0.5, 5.0, dense, paths, scattered, walls=Walls.of(grid), corrected=False)
+    interface = BodyInterface.of(1.4, 0.0)
+    channel = _ChannelSystem(grid, interface, 0.5, 5.0, dense, paths, scattered, walls=Walls.of(grid), corrected=False)
     matrix = channel._cells._matrix.toarray()
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-14 * np.abs(matrix).max())
     np.linalg.cholesky(matrix)  # raises unless all is positive

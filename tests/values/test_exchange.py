@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,7 @@ from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.geometry.ray_caster import unit
 from translucent.geometry.solids import Box, Sphere
+from translucent.planning.bodies import enclosed_bodies
 from translucent.planning.plan import plan
 from translucent.planning.scattering import Diffusion
 from translucent.scene.environment_map import EnvironmentMap
@@ -242,3 +245,30 @@ def test_light_of_lights_on_a_ball_in_glass_is_as_much_as_the_glass_collects(mon
     assert found.lit
     black = 0.75**2 * passed.mean() / (4.0 * 0.5**2 * 1.5**2)
     np.testing.assert_allclose(found.at(0.5 * normals, normals).mean(), black, rtol=0.03)
+
+
+def test_a_ball_of_wax_in_a_ball_of_glass(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What leaves it comes back where the glass mirrors it; without losses it is not there in even light."""
+    monkeypatch.setattr(irradiance_maps, "PATHS", 1 << 14)
+    body = tl.Object(Sphere(radius=0.5).tessellate(48), tl.Medium(scattering=200.0, ior=1.4), priority=1)
+    glass = tl.Object(Sphere().tessellate(64), tl.Medium(ior=1.5))
+    scene = tl.Scene([glass, body], CAMERA, environment=WHITE, overlap="priority")
+    planned = plan(scene, scattering=Diffusion(12))
+    assert enclosed_bodies(planned.scene) == (1,)
+    paths = irradiance_maps.EnclosedPaths(planned.scene, 1, {1: lit_body(body, None, Diffusion(12).cell_size(body))})
+    np.testing.assert_array_equal(paths.outside, 1.5)
+    # A ray that leaves the ball at an angle meets the glass at half its sine, and comes back at the same angle.
+    sine = np.sqrt((np.arange(1000) + 0.5) / 1000)
+    back = optics.fresnel_dielectric(np.sqrt(1.0 - (0.5 * sine) ** 2), 1.0 / 1.5)
+    entering = 1.0 - optics.fresnel_dielectric(np.sqrt(1.0 - sine**2), 1.4 / 1.5)
+    returned = paths.exchange.returned(np.ones(len(paths.outside)), 0)
+    assert returned.mean() == pytest.approx((back * entering).mean(), rel=0.05)
+    found = FieldCache().of(planned).surfaces[1]
+    np.testing.assert_allclose(found.leaving, np.pi, rtol=0.03)
+    # The ball collects the sun's light as one 1.5 times as wide, and at last all of it leaves through the glass.
+    lit = plan(
+        replace(scene, lights=[tl.DirectionalLight((0, 0, -1), 1.0)], environment=BLACK), scattering=Diffusion(12)
+    )
+    sun = FieldCache().of(lit).surfaces[1].leaving.mean() * 1.5**2 * (1.0 - back.mean())
+    passed = 1.0 - optics.fresnel_dielectric(np.sqrt(1.0 - (0.75 * sine) ** 2), 1.5)
+    assert sun == pytest.approx(0.75**2 * (passed * entering).mean() / (4.0 * 0.5**2), rel=0.03)

@@ -12,7 +12,7 @@ import translucent as tl
 from tests.ball_light import ball_parts, fresnel
 from translucent.arrays import Array
 from translucent.diffusion import cache
-from translucent.diffusion.entering import Pose, flux_of
+from translucent.diffusion.entering import Pose, rays_of_photons
 from translucent.diffusion.grid import body_grid
 from translucent.diffusion.photons import FineCells, photon_segments, photons_in_media
 from translucent.geometry.solids import Box, Sphere
@@ -74,7 +74,10 @@ def test_a_body_has_what_its_interface_lets_in() -> None:
         expected = entering[distance <= radius].sum()
         assert photons.power[landed <= radius, 0].sum() == pytest.approx(expected, abs=0.03 * flux.sum())
     grid = body_grid(milk, 0.25)
-    at_samples = flux_of(photons, grid, Pose.of(np.eye(4))[0])
+    rays = rays_of_photons(photons, grid, Pose.of(np.eye(4))[0])
+    at_samples = np.stack([np.bincount(rays.samples, part, len(grid.points)) for part in rays.entering.T], axis=1)
+    # The refracted light of the focus goes downwards, in a cone.
+    assert (rays.directions[:, 1] < 0.0).all()
     assert (at_samples * grid.areas[:, None]).sum() == pytest.approx(photons.power.sum())
     beside = np.hypot(grid.points[:, 0], grid.points[:, 2]) > 0.3
     assert at_samples[~beside & (grid.points[:, 1] > -1.6)].min() > 2.0 * at_samples[beside].mean()

@@ -11,12 +11,19 @@ from threading import Lock
 import numpy as np
 
 from translucent.arrays import Array, Integers
-from translucent.diffusion.entering import Occluders, bounding_ball, opaque_surfaces, radiance_without_suns
+from translucent.diffusion.entering import (
+    Occluders,
+    bounding_ball,
+    opaque_surfaces,
+    radiance_without_suns,
+    suns_of,
+)
 from translucent.diffusion.environment_ahead import behind_body
 from translucent.diffusion.exchange import BodyHits, GroundMap, GroundPoints, OpaqueSurfaces
-from translucent.diffusion.field import DiffusingBody, DiffusionField, lit_by_each_other
-from translucent.diffusion.irradiance_maps import IrradianceMap, irradiance_maps
+from translucent.diffusion.field import DiffusingBody, DiffusionField, EnclosedBody, lit_by_each_other
+from translucent.diffusion.irradiance_maps import EnclosedPaths, IrradianceMap, irradiance_maps
 from translucent.diffusion.keys import (
+    bending_key,
     coefficients_of,
     diffusing_media,
     diffusion_key,
@@ -41,7 +48,8 @@ from translucent.diffusion.solution import BodySystem
 from translucent.diffusion.volume import DiffusingVolume, PhotonFluence, VolumeField, VolumeGrid
 from translucent.geometry.ray_caster import RayCaster
 from translucent.media.medium import Medium
-from translucent.planning.caustics import opaque_to_shadows
+from translucent.planning.bodies import enclosed_bodies
+from translucent.planning.caustics import Caustics, opaque_to_shadows
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.rendered import Treatment, treatment_of
 from translucent.planning.scattering import Diffusion
@@ -105,6 +113,7 @@ class FieldCache:
         self._lock = Lock()
         self._opaque: OrderedDict[Hashable, OpaqueSurfaces | None] = OrderedDict()
         self._bodies: OrderedDict[Hashable, LitBody] = OrderedDict()
+        self._paths: OrderedDict[Hashable, EnclosedPaths] = OrderedDict()
         self._shapes: OrderedDict[Hashable, BodyShape] = OrderedDict()
         self._systems: OrderedDict[Hashable, BodySystem] = OrderedDict()
         self._grids: OrderedDict[Hashable, VolumeGrid] = OrderedDict()
@@ -168,6 +177,7 @@ class FieldCache:
             for store in (
                 self._opaque,
                 self._bodies,
+                self._paths,
                 self._shapes,
                 self._systems,
                 self._grids,
@@ -189,13 +199,20 @@ class FieldCache:
         inner = {i: inclusions_of(objects[i], inside) for i in media}
         alone = {i: LitBody(self._shape(objects[i], inner[i], diffusion), Occluders(objects[i], opaque)) for i in media}
         others = {i: tuple(k for k in alone if k != i and may_light(alone[k], alone[i])) for i in alone}
-        bodies = {}
+        bodies, enclosed = {}, enclosed_bodies(scene)
         for i, medium in media.items():
             around = tuple((place_of(objects[k]), alone[k].shape) for k in others[i])
             key = place_of(objects[i]), alone[i].shape, places, around
             make = partial(replace, alone[i], others=tuple(alone[k] for k in others[i]))
             lit = kept(self._bodies, key, make, KEPT_BODIES)
-            bodies[i] = self._body(lit, medium, inclusion_colors(lit.grid, inner[i]), diffusion)
+            paths = None
+            if i in enclosed:
+                # The light of all others that paths come to is of their samples in this order.
+                others[i] = tuple(k for k in alone if k != i)
+                shapes = tuple(one.shape for one in alone.values())
+                follow = partial(EnclosedPaths, scene, i, alone)
+                paths = kept(self._paths, (i, shapes, places, bending_key(scene)), follow, KEPT_BODIES)
+            bodies[i] = self._body(lit, medium, inclusion_colors(lit.grid, inner[i]), diffusion, paths)
         return bodies, others
 
     def _shape(self, body: Object, inner: tuple[Object, ...], diffusion: Diffusion) -> BodyShape:
@@ -204,8 +221,11 @@ class FieldCache:
         key = place_of(own), body.density, step, tuple(place_of(item) for item in inner)
         return kept(self._shapes, key, lambda: body_shape(own, step, inner), KEPT_BODIES)
 
-    def _body(self, lit: LitBody, medium: Medium, colors: Array, diffusion: Diffusion) -> DiffusingBody:
+    def _body(
+        self, lit: LitBody, medium: Medium, colors: Array, diffusion: Diffusion, paths: EnclosedPaths | None
+    ) -> DiffusingBody:
         shape, roughness = lit.shape, roughness_of(lit.casters.body)
+        outside = None if paths is None else paths.outside
 
         def make() -> BodySystem:
             return BodySystem(
@@ -217,9 +237,13 @@ class FieldCache:
                 colors=colors,
                 corrected=diffusion.corrected,
                 warm_starts=self._warm_starts,
+                outside=outside,
             )
 
-        system = kept(self._systems, (shape, medium, roughness, colors.tobytes()), make, KEPT_BODIES)
+        around = b"" if outside is None else outside.tobytes()
+        system = kept(self._systems, (shape, medium, roughness, colors.tobytes(), around), make, KEPT_BODIES)
+        if paths is not None:
+            return EnclosedBody(paths, lit, medium, roughness, system)
         return DiffusingBody(lit, medium, roughness, system)
 
     def _volume(self, body: Object, medium: Medium, diffusion: Diffusion) -> DiffusingVolume:
@@ -237,6 +261,11 @@ class FieldCache:
     def _bent(self, plan: RenderPlan) -> _Bent:
         """Light that photons carry into bodies."""
         scene, caustics = plan.scene, plan.caustics
+        enclosed = [] if plan.caustics is not None else list(enclosed_bodies(scene))
+        if enclosed and (lights := (*scene.lights, *suns_of(scene.environment))):
+            found = photons_in_media(replace(scene, lights=lights), Caustics(0), {}, enclosed)
+            around = opaque_surfaces([scene.objects[k] for k in sorted(opaque_to_shadows(scene) - {*enclosed})])
+            return _Bent({}, found.entering, dict.fromkeys(enclosed, None if around is None else around.caster))
         if caustics is None or not (lit := media_lit_by_photons(scene)):
             return _Bent({}, {}, {})
         fogs = [i for i in lit if treatment_of(scene.objects[i]) is Treatment.VOLUME]

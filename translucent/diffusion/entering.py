@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import combinations_with_replacement
 from weakref import WeakKeyDictionary
@@ -14,9 +14,9 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from translucent.arrays import Array, Floats, Integers, Mask
-from translucent.diffusion.entering_rays import EnteringRays, joined_rays, two_directions
+from translucent.diffusion.entering_rays import EnteringRays, joined_rays, two_directions, two_of_many
 from translucent.diffusion.exchange import OpaqueSurfaces
-from translucent.diffusion.grid import BodyGrid
+from translucent.diffusion.grid import BodyGrid, nearest_samples
 from translucent.diffusion.keys import may_dim
 from translucent.diffusion.photons import EnteringPhotons
 from translucent.formulas import optics
@@ -216,14 +216,22 @@ def opaque_surfaces(objects: Sequence[Object]) -> OpaqueSurfaces | None:
     return OpaqueSurfaces(objects) if any(len(item.mesh.faces) for item in objects) else None
 
 
-def flux_of(photons: EnteringPhotons, grid: BodyGrid, pose: Pose) -> Array:
-    """(s, 3): flux of photons at the samples of a surface: each counts at the nearest one."""
-    flux = np.zeros((len(grid.points), 3))
-    if len(photons.points):
-        sample = cKDTree(grid.points).query(pose.inwards(photons.points - pose.shift))[1]
-        for channel in range(3):
-            flux[:, channel] = np.bincount(sample, photons.power[:, channel], len(flux)) / grid.areas
-    return flux
+def rays_of_photons(photons: EnteringPhotons, grid: BodyGrid, pose: Pose) -> EnteringRays:
+    """Rays in place of photons that enter a body: each counts at the nearest sample and its neighbors."""
+    sample = nearest_samples(
+        grid.points,
+        grid.face_normals,
+        grid.area,
+        pose.inwards(photons.points - pose.shift),
+        -pose.inwards(photons.directions),
+    )
+    flux = photons.power / grid.areas[sample, None]
+    rays = EnteringRays(sample, pose.inwards(photons.directions), flux, np.zeros_like(flux))
+    found = two_of_many(rays, grid.face_normals, grid.mean_of_neighbors)
+    # Means over neighbors keep even light even, and its power nearly.
+    power = grid.areas[found.samples] @ found.entering
+    scale = photons.power.sum(axis=0) / np.where(power > 0.0, power, 1.0)
+    return replace(found, entering=scale * found.entering)
 
 
 @dataclass(frozen=True, eq=False)

@@ -81,17 +81,26 @@ def two_directions(mean: Array, square: Array, normals: Array) -> tuple[Array, A
     return flat, steep
 
 
-def two_of_many(rays: EnteringRays, normals: Array) -> EnteringRays:
-    """Two rays at each sample in place of all rays of one light there; normals (s, 3). See `two_directions`."""
+def two_of_many(rays: EnteringRays, normals: Array, mean: sparse.csr_array | None = None) -> EnteringRays:
+    """Two rays at each sample in place of all rays of one light there; see `two_directions`.
+
+    Parameters
+    ----------
+    rays : EnteringRays
+    normals : (s, 3)
+    mean : (s, s) csr_array, optional
+        Over neighbors, for random rays.
+    """
     flux = rays.entering.sum(axis=1, keepdims=True)
     cosine = (rays.directions * normals[rays.samples]).sum(axis=1, keepdims=True)
     columns = np.concatenate([flux, flux * cosine**2, flux * rays.directions, rays.entering, rays.mirrored], axis=1)
     sums = [np.bincount(rays.samples, column, len(normals)) for column in columns.T]
-    samples = np.flatnonzero(sums[0])
-    found = np.asarray(np.stack(sums, axis=1)[samples], np.float64)
-    mean, square = found[:, 2:5] / found[:, :1], found[:, 1] / found[:, 0]
+    every = np.stack(sums, axis=1) if mean is None else mean @ np.stack(sums, axis=1)
+    samples = np.flatnonzero(every[:, 0])
+    found = np.asarray(every[samples], np.float64)
+    towards, square = found[:, 2:5] / found[:, :1], found[:, 1] / found[:, 0]
     entering, mirrored = 0.5 * found[:, 5:8], 0.5 * found[:, 8:]
-    parts = [EnteringRays(samples, to, entering, mirrored) for to in two_directions(mean, square, normals[samples])]
+    parts = [EnteringRays(samples, to, entering, mirrored) for to in two_directions(towards, square, normals[samples])]
     return joined_rays(parts, from_one=rays.from_one)
 
 

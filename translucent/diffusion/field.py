@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -14,18 +14,20 @@ from translucent.diffusion.entering import (
     Pose,
     dimming_bodies,
     environment_parts,
-    flux_of,
     from_light,
     light_passed,
     nearest_parts,
     radiance_without_suns,
+    rays_of_photons,
     sky_light,
     suns_of,
 )
 from translucent.diffusion.entering_rays import EnteringRays, joined_rays, two_of_many
 from translucent.diffusion.environment_ahead import EnvironmentAhead
-from translucent.diffusion.exchange import Patches, direct_irradiance
+from translucent.diffusion.exchange import Exchange, Patches, direct_irradiance
 from translucent.diffusion.grid import BodyGrid
+from translucent.diffusion.interfaces import BodyInterface
+from translucent.diffusion.irradiance_maps import EnclosedPaths, PathExchange
 from translucent.diffusion.keys import dimming_key, environment_key, kept, light_key, may_dim
 from translucent.diffusion.lit_body import LitBody
 from translucent.diffusion.photons import EnteringPhotons
@@ -273,6 +275,9 @@ class DiffusingBody:
         See `BodySystem`.
     """
 
+    #: Photons carry the light of suns, too.
+    enclosed = False
+
     @np.errstate(under="ignore")
     def __init__(
         self,
@@ -286,8 +291,6 @@ class DiffusingBody:
     ) -> None:
         self.lit, self._medium, self._roughness = lit, medium, roughness
         self._interface = diffuse_interface(medium.ior, roughness)
-        self._entrance = lit.entrance(medium.ior, roughness)
-        self._exchange = lit.exchange(medium.ior, roughness)
         self._system = system or BodySystem(
             lit.grid,
             medium,
@@ -297,6 +300,11 @@ class DiffusingBody:
             corrected=corrected,
             warm_starts=warm_starts,
         )
+
+    @cached_property
+    def _exchange(self) -> Exchange | PathExchange:
+        """Light of the body, and of others, that falls on it."""
+        return self.lit.exchange(self._medium.ior, self._roughness)
 
     @np.errstate(under="ignore")
     def field(
@@ -308,7 +316,7 @@ class DiffusingBody:
     @np.errstate(under="ignore")
     def field_of(self, found: DiffuseSolution) -> DiffusionField:
         """Subsurface light of a solution."""
-        return _field(self.lit, self._medium, self._roughness, found)
+        return _field(self.lit, self._medium, self._system.interface, found)
 
     @np.errstate(under="ignore")
     def solved(
@@ -323,10 +331,6 @@ class DiffusingBody:
         through = (self._medium.ior, self._roughness, tuple(map(dimming_key, dimming)), stops)
         suns = suns_of(scene.environment)
 
-        def sky() -> tuple[Array, EnteringRays]:
-            parts = environment_parts(scene.environment, self.lit.shape.sky.directions, pose.turn, suns=False)
-            return self._from_sky(parts, dimming)
-
         def rays_of(lights: Sequence[Light], stops: RayCaster | None) -> tuple[Array, EnteringRays]:
             casters, ior, interface = self.lit.casters, self._medium.ior, self._interface
             found = [from_light(grid, casters, light, ior, interface, dimming, stops) for light in lights]
@@ -334,7 +338,8 @@ class DiffusingBody:
             return np.zeros((0, 3)), two_of_many(together, grid.face_normals) if len(lights) > 2 else together
 
         arriving, most = self.lit.arriving, 1 + len(scene.lights) + len(suns)
-        entering, bright = kept(arriving, (environment_key(scene.environment), through), sky, most)
+        around = environment_key(scene.environment), through, self._sky_key(scene)
+        entering, bright = kept(arriving, around, partial(self._light_around, scene, dimming), most)
         rays, inside = [bright], np.zeros((grid.count, 3))
         outside = list[Light]()
         for light in scene.lights:
@@ -345,13 +350,12 @@ class DiffusingBody:
         for lights in by_spheres(outside):
             key = *map(light_key, lights), through
             rays.append(kept(arriving, key, partial(rays_of, lights, stops), most)[1])
-        for sun in suns:  # photons carry none of its light
-            rays.append(kept(arriving, ("sun", light_key(sun), through), partial(rays_of, [sun], None), most)[1])
+        for sun in suns:
+            past = stops if self.enclosed else None  # photons carry none of its light
+            rays.append(kept(arriving, ("sun", light_key(sun), through), partial(rays_of, [sun], past), most)[1])
         if photons is not None:
-            entering = entering + flux_of(photons, grid, pose)
-        if (patches := self.lit.patches) is not None:
-            radiosity = patches.radiosity(self._irradiance(patches, scene, body, suns))
-            entering = entering + self._exchange.received(radiosity)
+            rays.append(rays_of_photons(photons, grid, pose))
+        entering = entering + self._from_patches(scene, body, suns)
         returned = self._exchange.returned if self._exchange.any else None
         return self._system.solved(entering, returned, inside, rays)
 
@@ -378,6 +382,22 @@ class DiffusingBody:
         straight = direct_irradiance(patches.points, patches.normals, (*scene.lights, *suns), surfaces.caster, passed)
         return straight + patches.from_sky(partial(radiance_without_suns, scene.environment))
 
+    def _from_patches(self, scene: Scene, body: int, suns: Sequence[DirectionalLight]) -> Array | float:
+        """(s, 3): flux that enters from opaque surfaces."""
+        if not isinstance(self._exchange, Exchange) or (patches := self.lit.patches) is None:
+            return 0.0
+        radiosity = patches.radiosity(self._irradiance(patches, scene, body, suns))
+        return self._exchange.received(radiosity)
+
+    def _sky_key(self, scene: Scene) -> Hashable:
+        """All that `_light_around` depends on beside the environment and the bodies on its path."""
+        return ()
+
+    def _light_around(self, scene: Scene, others: list[Object]) -> tuple[Array, EnteringRays]:
+        """Light of the environment that enters, less what other bodies on its path absorb."""
+        directions, turn = self.lit.shape.sky.directions, self.lit.pose.turn
+        return self._from_sky(environment_parts(scene.environment, directions, turn, suns=False), others)
+
     def _from_sky(self, parts: Array, others: list[Object]) -> tuple[Array, EnteringRays]:
         """Flux (s, 3) that enters from radiance over solid angles (k, 3), less what other bodies on its path absorb.
 
@@ -386,7 +406,8 @@ class DiffusingBody:
         """
         if not parts.any():
             return np.zeros((len(self.lit.grid.points), 3)), joined_rays([])
-        sky, ior, received = self.lit.shape.sky, self._medium.ior, self._entrance.received[None]
+        sky, ior = self.lit.shape.sky, self._medium.ior
+        received = self.lit.entrance(ior, self._roughness).received[None]
         means = parts / nearest_parts(sky.directions)[1][:, None]
         absorbing = [body for body in others if body.medium is not None and np.any(body.medium.absorption)]
         if absorbing:
@@ -399,6 +420,36 @@ class DiffusingBody:
             )
         mirrored = (1.0 - diffuse_interface(ior).entering) / self._interface.entering
         return sky_light(sky, received, means, self.lit.grid.normals, ior, mirrored)
+
+
+class EnclosedBody(DiffusingBody):
+    """Solver of a body that is inside clear ones: light comes to it, and from it back to it, through their interfaces.
+
+    Parameters
+    ----------
+    paths : EnclosedPaths
+        Of the light on the body.
+    lit, medium, roughness, system
+        As of `DiffusingBody`.
+    """
+
+    enclosed = True
+
+    def __init__(
+        self, paths: EnclosedPaths, lit: LitBody, medium: Medium, roughness: float, system: BodySystem
+    ) -> None:
+        super().__init__(lit, medium, roughness, system)
+        self._paths = paths
+
+    @cached_property
+    def _exchange(self) -> Exchange | PathExchange:
+        return self._paths.exchange
+
+    def _sky_key(self, scene: Scene) -> Hashable:
+        return self._paths, tuple(map(light_key, scene.lights)) if self._paths.meets_opaque else ()
+
+    def _light_around(self, scene: Scene, others: list[Object]) -> tuple[Array, EnteringRays]:
+        return self._paths.light(scene)
 
 
 def _cell_at(grid: BodyGrid, pose: Pose, position: npt.ArrayLike) -> int:
@@ -414,17 +465,17 @@ def _cell_at(grid: BodyGrid, pose: Pose, position: npt.ArrayLike) -> int:
     return int(grid.number[tuple(place)])
 
 
-def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolution) -> DiffusionField:
+def _field(lit: LitBody, medium: Medium, interface: BodyInterface, found: DiffuseSolution) -> DiffusionField:
     grid, extinction = lit.grid, medium.extinction
     reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
     total = reduced + np.asarray(medium.absorption)
     albedo = np.where(total > 0.0, reduced / np.where(total > 0.0, total, 1.0), 0.0)
-    interface, polished = diffuse_interface(medium.ior, roughness), diffuse_interface(medium.ior)
+    polished, brightness = diffuse_interface(interface.ior), np.reshape(interface.brightness, (-1, 1))
     scattered = np.maximum(found.scattered, LEAST_SCATTERED)
-    directed = medium.ior == 1.0 and abs(medium.anisotropy) >= DIRECTED
+    directed = interface.ior == 1.0 and abs(medium.anisotropy) >= DIRECTED
     parts: list[tuple[Array, Array | float]] = [
-        (found.fluence, found.inside),
-        (albedo * found.entering, 0.0),
+        (brightness * found.fluence, found.inside),
+        (brightness * albedo * found.entering, 0.0),
         (found.cosine[:, None], UNIFORM_COSINE),
         (scattered, 1.0),
     ]
@@ -434,7 +485,7 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
     on_paths[on_paths == 0.0] = 1.0
     inclusions = None if grid.inclusions is None else lit.shape.on_inclusions(found.at_inclusions)
     # Light leaves as through a polished interface, and more of it through a rough one.
-    cosines, weights = exit_quadrature(medium.ior)
+    cosines, weights = exit_quadrature(interface.ior)
     ahead = np.asarray(medium.scattering) * max(medium.anisotropy, 0.0)
     # Of diffuse light, four times the volume over the area.
     chord = 2.0 * lit.casters.body.mean_thickness * float(np.average(lit.shape.densities.cells, weights=grid.volumes))
@@ -448,9 +499,9 @@ def _field(lit: LitBody, medium: Medium, roughness: float, found: DiffuseSolutio
         placement=GridPlacement.of(grid.cells, lit.pose),
         albedo=albedo,
         phase=medium.phase_function,
-        conductance=interface.conductance,
-        exit_share=interface.exit_share,
-        exits=(cosines, interface.entering / polished.entering * weights),
+        conductance=interface.main.conductance,
+        exit_share=interface.main.exit_share,
+        exits=(cosines, interface.main.entering / polished.entering * weights),
         leaving=found.leaving,
         steps=found.steps,
         cells=grid.count,

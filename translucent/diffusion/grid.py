@@ -215,7 +215,8 @@ class BodyGrid:
         # Not the numbers by which the samples lie on large triangles: there, light would come from one side alone.
         first, second = other_plane_points(len(self.points)).T
         first, second = (first + number / INWARD_DIRECTIONS) % 1.0, (second + 0.618 * number) % 1.0
-        cosine = optics.refracted_cosine(np.sqrt(first), ior)
+        # In a medium of a smaller index the light that is not reflected totally fills the whole hemisphere.
+        cosine = optics.refracted_cosine(np.sqrt(first), max(ior, 1.0))
         across, along = self._tangents
         angle, level = 2.0 * np.pi * second, np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
         sideways = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * along
@@ -331,6 +332,11 @@ class BodyGrid:
         variance = 0.5 * float((weight * (offset**2).sum(axis=2)).sum(axis=1).mean())
         starts = np.arange(len(near) + 1) * near.shape[1]
         return sparse.csr_array((weight.ravel(), near.ravel(), starts), (len(near), len(near))), variance
+
+    @property
+    def mean_of_neighbors(self) -> sparse.csr_array:
+        """(s, s): mean over each sample and its neighbors on the same smooth surface."""
+        return self._mean_of_neighbors[0]
 
     def smoothed(self, values: Array, variance: float) -> Array:
         """(s,): values (s,) at the samples, smoothed along the surface with a variance in m^2 along each axis."""

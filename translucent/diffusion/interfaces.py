@@ -20,6 +20,7 @@ import numpy as np
 from translucent.arrays import Array, Integers, Mask
 from translucent.formulas import optics
 from translucent.formulas.bsdf import Interaction
+from translucent.formulas.diffuse_interface import DiffuseInterface, diffuse_interface, exit_quadrature
 from translucent.formulas.interface import channel_iors, reflected_direction
 from translucent.geometry.ray_caster import ray_caster_of
 from translucent.scene.scene import Object, Scene
@@ -151,6 +152,76 @@ class InterfaceTable:
             self._metres[item],
             self._extinction[item],
             self._emission[item],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class BodyInterface:
+    """Interface between a body in which light diffuses and what is around it, as a whole and at each sample.
+
+    Attributes
+    ----------
+    ior : float
+        Index of the body relative to what is around most of it.
+    outside : float
+        Index of what is around most of it.
+    main : DiffuseInterface
+        Of that index.
+    mirrored : float, or (s,) float64
+        Flux that the surface reflects, for a unit of uniform light that enters.
+    conductance, exit_share : float, or (s,) float64
+        See `DiffuseInterface`.
+    uniform : float, or (s,) float64
+        Flux that enters in uniform light, over that where most of what is around is.
+    brightness : float, or (s,) float64
+        Factor for a surface whose light is looked up as if `main` was its interface.
+    """
+
+    ior: float
+    outside: float
+    main: DiffuseInterface
+    mirrored: Array | float
+    conductance: Array | float
+    exit_share: Array | float
+    uniform: Array | float = 1.0
+    brightness: Array | float = 1.0
+
+    @classmethod
+    def of(cls, ior: float, roughness: float, outside: Array | None = None) -> BodyInterface:
+        """Interface of a medium of index `ior`; `outside` (s,) is the index around each sample, by default that of air.
+
+        Without refraction uniform light has one L / n^2 in all media: where n is larger, more enters.
+        """
+        indices, at, count = (
+            (np.ones(1), np.zeros(1, np.int64), np.ones(1))
+            if outside is None
+            else np.unique(outside, return_inverse=True, return_counts=True)
+        )
+        most = int(count.argmax())
+        every = [diffuse_interface(ior / index, roughness) for index in indices]
+
+        def each(values: list[float]) -> Array | float:
+            return values[0] if len(values) == 1 else np.array(values)[at.ravel()]
+
+        mirrored = [
+            (1.0 - diffuse_interface(ior / index).entering) / one.entering
+            for index, one in zip(indices, every, strict=True)
+        ]
+        sent = [index**2 * one.entering for index, one in zip(indices, every, strict=True)]
+        # What is looked up is scaled to the flux through the main interface; through another one less is visible.
+        seen = [
+            one.exit_share / float(exit_quadrature(ior / index)[1].sum())
+            for index, one in zip(indices, every, strict=True)
+        ]
+        return cls(
+            ior / float(indices[most]),
+            float(indices[most]),
+            every[most],
+            each(mirrored),
+            each([one.conductance for one in every]),
+            each([one.exit_share for one in every]),
+            each([one / sent[most] for one in sent]),
+            each([one / seen[most] for one in seen]),
         )
 
 

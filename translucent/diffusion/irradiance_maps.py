@@ -1,7 +1,9 @@
-"""Irradiance on opaque objects by light that interfaces refract and reflect, and that opaque objects reflect.
+"""Light that interfaces refract and reflect onto opaque objects, and into bodies that are inside clear ones.
 
 Random paths from samples of each object's surface gather it: they end at the environment, or at opaque objects, which
-light each other in a few rounds. Pictures look it up in a volume around the object, by the normal.
+light each other in a few rounds. Pictures look it up in a volume around the object, by the normal. Paths from samples
+of a body in which light diffuses end there and at such bodies, too: at itself where a clear body around it reflects the
+body's light back inside.
 
 References
 ----------
@@ -11,21 +13,27 @@ Shirley, Hubbard & Greenberg 1998, "The irradiance volume".
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
 from translucent.arrays import Array, Floats, Integers
-from translucent.diffusion.entering import Pose, dimming_bodies, light_passed, windings_at
+from translucent.diffusion.entering import Pose, dimming_bodies, light_passed, radiance_without_suns, windings_at
+from translucent.diffusion.entering_rays import EnteringRays, two_of_many
 from translucent.diffusion.exchange import ROUNDS, OpaqueSurfaces, cosine_directions, direct_irradiance, hemispheres
 from translucent.diffusion.grid import BodyGrid, body_grid, nearest_samples
-from translucent.diffusion.lit_body import own_frame
+from translucent.diffusion.lit_body import LitBody, own_frame
 from translucent.diffusion.photons import BATCH, MOST_SURFACES, Photons, PhotonSegmentTracer, joined
 from translucent.diffusion.sides import GridPlacement, SurfaceSides, beside
-from translucent.scene.scene import Scene
+from translucent.formulas import optics
+from translucent.formulas.diffuse_interface import diffuse_interface
+from translucent.formulas.interface import refracted_direction
+from translucent.planning.rendered import Treatment, treatment_of
+from translucent.scene.scene import Object, Scene
 
 #: Samples on each object, of all together, and paths from each: the fit of the volume takes the mean of about 16.
 SAMPLES, MOST_SAMPLES, RAYS = 2048, 6144, 48
@@ -225,3 +233,196 @@ class _Gathering:
             return light_passed(self.dimming, starts, directions, distance)
 
         return direct_irradiance(points, normals, self.scene.lights, self.surfaces.caster, passed)
+
+
+#: Paths from all samples of a body together, and from each at least and at most.
+PATHS, FEWEST, MOST = 1 << 17, 8, 48
+
+#: Bounds of the correction by which the paths of a sample let in the known fraction of uniform light.
+_CORRECTION = (0.5, 2.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PathExchange:
+    """Flux that enters a body for the flux that leaves it, and others, by way of interfaces and opaque objects.
+
+    Attributes
+    ----------
+    itself, others : three (s, s) csr_array, three (s, o) csr_array
+        By color channel: for the samples of the body, and for flux over n^2 at those of all others, one after another.
+    mean : (s, s) csr_array
+        Over neighbors: paths are few.
+    """
+
+    itself: Sequence[sparse.csr_array]
+    others: Sequence[sparse.csr_array]
+    mean: sparse.csr_array
+
+    @property
+    def any(self) -> bool:
+        """True if light that leaves the body falls on it again."""
+        return any(one.nnz for one in self.itself)
+
+    def returned(self, leaving: Array, channel: int) -> Array:
+        """(s,): flux that enters in a color channel for a flux (s,) that leaves."""
+        return np.asarray(self.mean @ (self.itself[channel] @ leaving))
+
+    def from_others(self, leaving: Array, passing: Array) -> Array:
+        """(s, 3): flux that enters for fluxes (o, 3) that leave other bodies, scattered and unscattered."""
+        sent = leaving + passing
+        found = [self.mean @ (self.others[channel] @ sent[:, channel]) for channel in range(3)]
+        return np.stack(found, axis=1)
+
+
+class EnclosedPaths:
+    """Paths from the samples of a body, backwards along the light that falls on it through interfaces.
+
+    They carry L / n^2, which refraction leaves as it is. Diffusing bodies end them, and opaque objects scatter them.
+
+    Parameters
+    ----------
+    scene : Scene
+    body : int
+    lit : dict of int to LitBody
+        All bodies of the scene in which light diffuses, by number.
+
+    Attributes
+    ----------
+    outside : (s,) float64
+        Index of refraction around each sample.
+    exchange : PathExchange
+    """
+
+    def __init__(self, scene: Scene, body: int, lit: Mapping[int, LitBody]) -> None:
+        own, self._lit = lit[body], lit
+        self._grid, pose = own.grid, own.pose
+        self._own, self._ior = body, _index(scene.objects[body])
+        points = pose.outwards(self._grid.points) + pose.shift
+        normals = pose.outwards(self._grid.face_normals)
+        starts = points + _ABOVE * self._grid.cells.step * normals
+        count = len(points)
+        self._rays = int(np.clip(PATHS // max(count, 1), FEWEST, MOST))
+        objects = [
+            Object(item.mesh, None, item.transform) if treatment_of(item) is Treatment.DIFFUSION else item
+            for item in scene.objects
+        ]
+        self._scene = replace(scene, objects=objects, lights=(), environment_shadows=0)
+        self._tracer = PhotonSegmentTracer(self._scene, np.random.default_rng(0))
+        self._surfaces = OpaqueSurfaces(self._scene.opaque)
+        numbers = {id(item): k for k, item in enumerate(self._surfaces.objects)}
+        self._opaque = np.array([numbers.get(id(item), -1) for item in objects])
+        owner, directions = hemispheres(normals, self._rays)
+        inside = windings_at(self._scene, starts, normals)[owner]
+        begun = self._tracer.begun_at(starts[owner], directions, np.ones((len(owner), 3)), inside)
+        indices = self._tracer.iors_around(begun)
+        self.outside: Array = indices.reshape(count, -1)[:, 0]
+        self._enters(owner, directions, normals, indices)
+        self._left: list[tuple[Integers, Array, Array]] = []
+        self._met: list[tuple[Integers, Array, Array, Array, Array]] = []
+        self._links: list[tuple[Integers, Integers, Integers, Array]] = []
+        for part in np.array_split(np.arange(len(owner)), len(owner) // BATCH + 1):
+            self._follow(begun.where(part))
+
+    def _enters(self, owner: Integers, directions: Array, normals: Array, indices: Array) -> None:
+        """Fractions of the light on each path that enter and that the interface reflects, and directions inside."""
+        relative = self._ior / indices
+        cosine = (directions * normals[owner]).sum(axis=1)
+        entering = 1.0 - optics.fresnel_dielectric(cosine, relative)
+        exact = np.array([diffuse_interface(one).entering for one in np.unique(relative)])
+        exact = exact[np.unique(relative, return_inverse=True)[1].ravel()].reshape(-1, self._rays)[:, 0]
+        mean = np.maximum(entering.reshape(-1, self._rays).mean(axis=1), 1e-9)
+        self._entering = entering * np.clip(exact / mean, *_CORRECTION)[owner]
+        self._mirrored = np.maximum(1.0 - self._entering, 0.0)
+        inside = refracted_direction(-directions, normals[owner], relative)
+        self._inside = self._lit[self._own].pose.inwards(inside)
+
+    def _follow(self, going: Photons) -> None:
+        for _ in range(MOST_SURFACES):
+            if not len(going.number):
+                return
+            step = self._tracer.step(going)
+            self._left.append((step.left.number, step.left.directions, step.left.power))
+            going = joined((step.going, self._land(step.landed)))
+
+    def _land(self, landed: Photons) -> Photons:
+        """End paths at bodies in which light diffuses; on opaque objects they go on, diffusely."""
+        item, face = self._tracer.surfaces_of(landed)
+        for k, other in self._lit.items():
+            at = np.flatnonzero(item == k)
+            sample = other.nearest_sample(landed.origins[at])
+            self._links.append((np.full(len(at), k), landed.number[at], sample, landed.power[at]))
+        at = np.flatnonzero(~np.isin(item, list(self._lit)))
+        further = landed.where(at)
+        number = self._surfaces.first[self._opaque[item[at]]] + face[at]
+        reflected, emitted = self._surfaces.light(number, further.origins)
+        normals = self._surfaces.normals(number)
+        normals = np.where((normals * further.directions).sum(axis=1, keepdims=True) > 0.0, -normals, normals)
+        fraction = further.power * reflected
+        self._met.append((further.number, further.origins, normals, fraction, further.power * emitted))
+        further.power = fraction
+        further.directions = cosine_directions(normals, *self._tracer.rng.random((2, len(at))))
+        return further
+
+    @property
+    def meets_opaque(self) -> bool:
+        """True if some paths come to opaque objects, which lights light straight."""
+        return any(len(one[0]) for one in self._met)
+
+    @cached_property
+    def exchange(self) -> PathExchange:
+        """Light of this body, and of others, on it."""
+        item, ray, sample, power = (np.concatenate(part) for part in zip(*self._links, strict=True))
+        owner, count = ray // self._rays, len(self.outside)
+        values = (self._entering[ray] * self.outside[owner] ** 2 / self._rays)[:, None] * power
+        others = [k for k in self._lit if k != self._own]
+        sizes = [len(self._lit[k].grid.points) for k in others]
+        offset = dict(zip(others, np.cumsum([0, *sizes]).tolist(), strict=False))
+        mine = item == self._own
+        # The flux that leaves others is over n^2 already.
+        values[mine] /= self.outside[sample[mine], None] ** 2
+        column = sample + np.array([offset.get(k, 0) for k in item.tolist()], np.int64)
+
+        def matrices(of: Array, columns: int) -> list[sparse.csr_array]:
+            shape = count, columns
+            return [sparse.csr_array((values[of, channel], (owner[of], column[of])), shape) for channel in range(3)]
+
+        return PathExchange(matrices(mine, count), matrices(~mine, sum(sizes)), self._grid.mean_of_neighbors)
+
+    def light(self, scene: Scene) -> tuple[Array, EnteringRays]:
+        """Uniform flux (s, 3) that enters, and rays for the rest, from environment and opaque objects of a scene.
+
+        Lights light opaque objects straight.
+        """
+        found, whole = np.zeros((2, len(self._entering), 3))
+
+        def add(to: Array, ray: Integers, light: Array) -> None:
+            for channel in range(3):
+                to[:, channel] += np.bincount(ray, light[:, channel], len(to))
+
+        for ray, directions, power in self._left:
+            add(found, ray, power * radiance_without_suns(scene.environment, directions))
+            add(whole, ray, power)
+        dimming = dimming_bodies(scene, -1)
+        for ray, points, normals, fraction, emitted in self._met:
+            add(found, ray, emitted)
+            if len(ray) and scene.lights:
+                passed = partial(light_passed, dimming)
+                direct = direct_irradiance(points, normals, scene.lights, self._surfaces.caster, passed)
+                add(found, ray, fraction * direct / np.pi)
+        count, flux = len(self.outside), np.pi * self.outside**2 / self._rays
+        parts = found.reshape(count, -1, 3), whole.reshape(count, -1, 3)
+        ratios = np.where(parts[1] > 0.0, parts[0] / np.where(parts[1] > 0.0, parts[1], 1.0), np.inf)
+        least = ratios.min(axis=1, keepdims=True)
+        least = np.where(np.isfinite(least), least, 0.0)
+        uniform = (self._entering.reshape(count, -1, 1) * parts[1] * least).sum(axis=1) * flux[:, None]
+        rest = (parts[0] - parts[1] * least).reshape(-1, 3) * np.repeat(flux, self._rays)[:, None]
+        used = np.flatnonzero((self._entering > 0.0) & rest.any(axis=1))
+        entering, mirrored = (part[used, None] * rest[used] for part in (self._entering, self._mirrored))
+        rays = EnteringRays(used // self._rays, self._inside[used], entering, mirrored)
+        mean = self._grid.mean_of_neighbors
+        return mean @ uniform, two_of_many(rays, self._grid.face_normals, mean)
+
+
+def _index(item: Object) -> float:
+    assert item.medium is not None
+    return item.medium.ior

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.media.medium import Medium
+from translucent.planning.bodies import enclosed_bodies
 from translucent.planning.caustics import lit_by_photons
 from translucent.planning.render_plan import RenderPlan
 from translucent.planning.rendered import Treatment, scatterer_of, treatment_of
@@ -27,8 +28,9 @@ def diffusion_key(plan: RenderPlan) -> Hashable:
     """Key of all values that the multiply scattered light of a plan depends on; it does not depend on the camera."""
     scene, caustics = plan.scene, plan.caustics
     followed = caustics is not None and media_lit_by_photons(scene)
-    bending = (caustics.in_media, caustics.seed, _bending(scene)) if caustics is not None and followed else ()
-    exchange = (plan.exchanging, photons_on_opaque(plan), _bending(scene)) if plan.exchanging else ()
+    bending = (caustics.in_media, caustics.seed, bending_key(scene)) if caustics is not None and followed else ()
+    exchange = (plan.exchanging, photons_on_opaque(plan), bending_key(scene)) if plan.exchanging else ()
+    enclosing = bending_key(scene) if enclosed_bodies(scene) else ()
     bodies = tuple(
         (
             i,
@@ -45,7 +47,7 @@ def diffusion_key(plan: RenderPlan) -> Hashable:
     lights = tuple(light_key(light) for light in scene.lights)
     dimming = tuple((i, dimming_key(item)) for i, item in enumerate(scene.objects) if may_dim(item))
     shadows = bool(scene.environment_shadows)  # of bodies on a ground, see `ground_map`
-    return (plan.diffusion, bodies, opaque, lighting, lights, dimming, bending, exchange, shadows)
+    return (plan.diffusion, bodies, opaque, lighting, lights, dimming, bending, exchange, enclosing, shadows)
 
 
 def environment_key(around: Environment) -> Hashable:
@@ -112,7 +114,7 @@ def roughness_of(item: Object) -> float:
     return 0.0 if item.surface is None else item.surface.roughness
 
 
-def _bending(scene: Scene) -> Hashable:
+def bending_key(scene: Scene) -> Hashable:
     """Everything except the lights that photon paths depend on."""
     objects = tuple(
         (

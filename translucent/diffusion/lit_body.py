@@ -256,8 +256,12 @@ class LitBody:
         distance = ray_caster_of(self.casters.body.mesh).distances(*local, number, number).astype(np.float64)
         sample, hit = np.zeros(len(origins), np.int64), np.isfinite(distance)
         places = origins[hit] + distance[hit, None] * directions[hit]
-        sample[hit] = self._tree.query(self.pose.inwards(places - self.pose.shift))[1]
+        sample[hit] = self.nearest_sample(places)
         return distance, sample
+
+    def nearest_sample(self, places: Array) -> Integers:
+        """(k,): sample nearest to places (k, 3) of the world."""
+        return np.asarray(self._tree.query(self.pose.inwards(places - self.pose.shift))[1], np.int64)
 
     @cached_property
     def _tree(self) -> cKDTree:

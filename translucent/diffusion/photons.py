@@ -463,13 +463,14 @@ class EnteringPhotons:
 
     Attributes
     ----------
-    points : (n, 3) float64
-        In metres in the world.
+    points, directions : (n, 3) float64
+        In metres in the world; and behind the interface.
     power : (n, 3) float64
         In W, without the reflected part.
     """
 
     points: Array
+    directions: Array
     power: Array
 
 
@@ -511,6 +512,7 @@ def _entering(parts: list[PhotonSegments]) -> EnteringPhotons:
     none = np.zeros((0, 3))
     return EnteringPhotons(
         np.concatenate([none, *(part.origins for part in parts)]),
+        np.concatenate([none, *(part.directions for part in parts)]),
         np.concatenate([none, *(part.power for part in parts)]),
     )
 

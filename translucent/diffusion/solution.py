@@ -37,11 +37,11 @@ from translucent.diffusion.first_events import (
     seen_inclusions,
 )
 from translucent.diffusion.grid import BodyGrid
-from translucent.diffusion.interfaces import scattered_escape
+from translucent.diffusion.interfaces import BodyInterface, scattered_escape
 from translucent.diffusion.keys import kept
 from translucent.diffusion.walls import SlabSolution, Walls
 from translucent.formulas import optics
-from translucent.formulas.diffuse_interface import diffuse_interface, diffusion_coefficient, half_space_reflectance
+from translucent.formulas.diffuse_interface import diffusion_coefficient, half_space_reflectance
 from translucent.formulas.diffusion import UNIFORM_COSINE
 from translucent.formulas.phase import ISOTROPIC, PhaseFunction
 from translucent.media.medium import Medium
@@ -98,9 +98,10 @@ class DiffuseSolution:
     travel : (s, 3) float64
         Mean direction of that light, inside; shorter than 1 where it comes from several.
     leaving : (s, 3) float64
-        Flux that leaves the samples: what has been in the body, and what its surface mirrors.
+        Flux that leaves the samples: what has been in the body, and what its surface mirrors; over n^2 in a medium of
+        index n.
     passing : (s, 3) float64
-        Uniform light that leaves the samples without an event.
+        Uniform light that leaves the samples without an event, likewise.
     scattered : (s, 3) float64
         Fraction of the paths through the body from each sample on which uniform light is scattered.
     steps : int
@@ -161,6 +162,12 @@ class BodySystem:
         all else.
     warm_starts : bool
         Solutions start from those for earlier light, in few steps. They then depend on it, within `TOLERANCE`.
+    outside : (s,) float64, optional
+        Index of what is around the body, at its samples; default: air.
+
+    Attributes
+    ----------
+    interface : BodyInterface
     """
 
     @np.errstate(under="ignore")
@@ -175,27 +182,29 @@ class BodySystem:
         colors: Array | None = None,
         corrected: bool = True,
         warm_starts: bool = False,
+        outside: Array | None = None,
     ) -> None:
-        self._warm_starts, self._ior = warm_starts, medium.ior
+        self.interface = BodyInterface.of(medium.ior, roughness, outside)
+        self._squares = np.ones((1, 1)) if outside is None else outside[:, None] ** 2
+        self._warm_starts, ior = warm_starts, self.interface.ior
         self._arriving: OrderedDict[Hashable, tuple[dict[int, _DirectionalEffects], Array]] = OrderedDict()
-        self._emitted = 4.0 * np.pi * np.asarray(medium.emission)
+        self._emitted = 4.0 * np.pi * self.interface.outside**2 * np.asarray(medium.emission)
         reduced = np.asarray(medium.scattering) * (1.0 - medium.anisotropy)
         self._grid, self._dense = grid, dense or even_densities(grid)
         count = 0 if grid.inclusions is None else len(grid.inclusions.points)
         colors = np.full((count, 3), 0.5) if colors is None else colors
-        paths, walls = diffuse_paths(grid, self._dense, medium.ior), walls or Walls.of(grid)
+        paths, walls = diffuse_paths(grid, self._dense, ior), walls or Walls.of(grid)
         self._channels = {
             channel: _ChannelSystem(
                 grid,
-                medium.ior,
-                roughness,
+                self.interface,
                 float(absorption),
                 float(scattering),
                 self._dense,
                 paths,
-                scattered_fractions(grid, self._dense, medium.ior, float(absorption + scattering)),
+                scattered_fractions(grid, self._dense, ior, float(absorption + scattering)),
                 medium.phase_function,
-                seen=seen_inclusions(grid, self._dense, medium.ior, float(absorption + scattering)),
+                seen=seen_inclusions(grid, self._dense, ior, float(absorption + scattering)),
                 reflected=np.asarray(colors[:, channel]),
                 walls=walls,
                 corrected=corrected,
@@ -267,6 +276,7 @@ class BodySystem:
         total = flux.sum(axis=1)
         cosine = _mean_cosine(total, directed, incidence[0])
         travel = _mean_direction(total, directed, incidence[1:].T, normals)
+        leaving, passing = (light / self._squares for light in (leaving, passing))
         return DiffuseSolution(fluence, flux, cells, inclusions, cosine, travel, leaving, passing, scattered, steps)
 
     def _directional(self, ray: EnteringRays) -> tuple[dict[int, _DirectionalEffects], Array]:
@@ -275,7 +285,7 @@ class BodySystem:
         And sums (4, s), over the channels, of the flux over 1/2 and its cosine, and of it times its direction.
         """
         path = entry_paths(ray, self._grid, self._dense)
-        shift = LateralShift.of(self._grid, ray, self._ior) if ray.from_one else None
+        shift = LateralShift.of(self._grid, ray, self.interface.ior) if ray.from_one else None
         effects, flux = dict[int, _DirectionalEffects](), np.zeros(())
         for channel, system in self._channels.items():
             found = system.directional(ray.entering[:, channel], ray.mirrored[:, channel], path, shift)
@@ -330,8 +340,7 @@ class _ChannelSystem:
     def __init__(
         self,
         grid: BodyGrid,
-        ior: float,
-        roughness: float,
+        interface: BodyInterface,
         absorption: float,
         scattering: float,
         dense: Densities,
@@ -344,9 +353,8 @@ class _ChannelSystem:
         walls: Walls,
         corrected: bool,
     ) -> None:
-        self._grid, interface = grid, diffuse_interface(ior, roughness)
-        self._exit_fraction = interface.exit_share
-        self._mirrored = (1.0 - diffuse_interface(ior).entering) / interface.entering
+        self._grid, ior = grid, interface.ior
+        self._exit_fraction, self._mirrored = interface.exit_share, interface.mirrored
         extinction = absorption + scattering
         self._albedo = scattering / extinction
         d = float(diffusion_coefficient(absorption, scattering))
@@ -359,7 +367,8 @@ class _ChannelSystem:
         chord = 4.0 * float(dense.cells @ grid.volumes) / (grid.area * len(depth))
         # Of diffusion, and of all events.
         self._extinctions = extinction, absorption + scattering / (1.0 - phase.mean_cosine)
-        self._ior, self._chord, self._interface = ior, chord, interface
+        self._ior, self._chord, self._interface = ior, chord, interface.main
+        self._even = np.broadcast_to(np.asarray(interface.uniform, np.float64), len(depth))
         self._walls = walls
         slab = SlabSolution(walls, ior, absorption, scattering, phase) if walls.any else None
         self._first = FirstEvents(grid, layer, ior, absorption, scattering, phase, chord, slab)
@@ -381,7 +390,7 @@ class _ChannelSystem:
         def system(part: float, *, corrected: bool = True) -> _ChannelSystem:
             """Linear system of an absorbing medium around lossless inclusions."""
             a, b, white = part * extinction, (1.0 - part) * extinction, np.ones(len(self._inclusions.lost))
-            same = partial(_ChannelSystem, grid, ior, roughness, a, b, dense, paths, scattered, seen=seen, walls=walls)
+            same = partial(_ChannelSystem, grid, interface, a, b, dense, paths, scattered, seen=seen, walls=walls)
             return same(reflected=white, corrected=corrected)
 
         self._absorbing, self._correction, self._brighter = system, np.ones(len(depth)), np.ones(())
@@ -402,11 +411,12 @@ class _ChannelSystem:
         straight through. Diffusion sends too much of it out of parts no thicker than a free path, and too little out
         of folds.
         """
-        even = np.ones(len(self._grid.points))
+        even = self._even
         source = self._power(even)
         cells, _ = self._cells.solved(source, self._cells.even(source), ROUGH)
-        found = (self._read @ cells) * self._attenuated + self._diffuse.near
-        found = self._exit_fraction * self._with_walls(found, self._in_walls(*self._diffuse.slab))
+        found = (self._read @ cells) * self._attenuated + self._diffuse.near * even
+        own, across = self._diffuse.slab
+        found = self._exit_fraction / even * self._with_walls(found, self._in_walls(own * even, across * even))
         surface = np.clip((1.0 - self.through) / np.maximum(found, _TINY), LEAST_CORRECTION, MOST_CORRECTION)
         # Few paths reach each sample of an inclusion: all of them count together.
         reaching = self._inclusions.reaching(self._grid, self._paths, self._diffuse.reached * even)
@@ -429,11 +439,14 @@ class _ChannelSystem:
         As long as little is absorbed on a chord the fluence is even, and as much of the scattered light leaves as the
         probability to escape says. Diffusion lets a few per cent more out of thin parts.
         """
-        source = self._power(np.ones(len(self._grid.points)))
+        source = self._power(self._even)
         cells, _ = self._cells.solved(source, self._cells.even(source))
-        found = np.maximum((self._read @ cells) * self._attenuated + self._diffuse.near, 0.0) * self._correction
+        found = (
+            np.maximum((self._read @ cells) * self._attenuated + self._diffuse.near * self._even, 0.0)
+            * self._correction
+        )
         areas, absorbed, extinction = self._grid.areas, 1.0 - self._albedo, self._extinctions[0]
-        left = self._exit_fraction * float(areas @ found) / max(float(areas @ self.scattered), _TINY)
+        left = float(areas @ (self._exit_fraction * found)) / max(float(areas @ (self._even * self.scattered)), _TINY)
         even = self._albedo * scattered_escape(self._escape(extinction), self._albedo) / max(left, _TINY)
         factor = 1.0 + float(optics.transmittance(absorbed * extinction * self._chord)) * (even - 1.0)
         return factor * cells, np.asarray(factor * found), factor
@@ -458,7 +471,7 @@ class _ChannelSystem:
         # Rays take what is scattered ahead for lost, and diffusion for unscattered: it stays here.
         ahead = float(optics.opacity(every * self._chord) / optics.opacity(extinction * self._chord))
         all_of_it = 0.25 * emission * entering / (part * extinction)
-        left = (all_of_it - 0.25 * emission * entering / every * ahead) / self._exit_fraction
+        left = (all_of_it - 0.25 * emission * entering / every * ahead) / self._interface.exit_share
         inside, at_samples = (
             power / given * np.maximum(left * scattered - all_of_it * found, 0.0)
             for scattered, found in ((self.scattered.mean(), cells), (self.scattered, fluence))

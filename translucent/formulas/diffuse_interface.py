@@ -118,12 +118,13 @@ def diffuse_interface(ior: float, roughness: float = 0.0) -> DiffuseInterface:
     Parameters
     ----------
     ior : float
-        Index inside relative to outside, >= 1.
+        Index inside relative to outside; below 1, light from outside is reflected totally at a slant, and roughness has
+        no effect.
     roughness : float
         Square root of the GGX alpha, 0 to 1.
     """
     cosine, weight = interface_nodes(ior)
-    outside, outside_weight = _gauss()
+    outside, outside_weight = _gauss() if ior >= 1.0 else interface_nodes(1.0 / ior)
     entered = 1.0 - optics.fresnel_dielectric(outside, ior)
     flux = 2.0 * outside * outside_weight * entered
     mean_cosine = float((flux * optics.refracted_cosine(outside, ior)).sum() / flux.sum())
@@ -239,7 +240,7 @@ def _chandrasekhar_h(albedo: float, cosine: Array, weight: Array) -> Array:
 
 def _inside_reflectance(cosine: Array, ior: float) -> Array:
     """Fresnel's reflectance of light from inside, at the nodes of `interface_nodes`."""
-    return optics.fresnel_dielectric(cosine, 1.0 / ior) if ior > 1.0 else np.zeros_like(cosine)
+    return optics.fresnel_dielectric(cosine, 1.0 / ior) if ior != 1.0 else np.zeros_like(cosine)
 
 
 @lru_cache(maxsize=8)
@@ -252,7 +253,7 @@ def _gauss(number: int = NODES) -> tuple[Array, Array]:
 def interface_nodes(ior: float, number: int = NODES) -> tuple[Array, Array]:
     """Nodes and weights for cosines inside, apart on both sides of the critical one."""
     x, weight = _gauss(number)
-    if ior == 1.0:
+    if ior <= 1.0:
         return x, weight
     critical = float(np.sqrt((1.0 - 1.0 / ior) * (1.0 + 1.0 / ior)))
     return (

@@ -5,7 +5,7 @@ Also the textures that rays read wherever they hit a surface, and how large thes
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,11 +63,7 @@ def exchanging_objects(scene: Scene) -> tuple[int, ...]:
     Those are objects in clear bodies, and others in such scenes that are no larger. None where too many would be, or
     where paths cannot be traced: through media of varying density, and open meshes.
     """
-    faces = sum(len(item.mesh.faces) for item in scene.objects)
-    if len(scene.objects) > MOST_TRACED or faces > MOST_TRACED_FACES or not (held := held_objects(scene)):
-        return ()
-    solids = [body for body in scene.bodies if body.sheet_thickness is None]
-    if any(body.density is not None for body in scene.bodies) or not all(b.mesh.diagnosis.solid for b in solids):
+    if not (held := held_objects(scene)) or not _can_be_traced(scene):
         return ()
     largest = LARGEST_EXCHANGING * max(_diagonal(body) for body in _clear_bodies(scene))
     found = tuple(
@@ -79,6 +75,35 @@ def exchanging_objects(scene: Scene) -> tuple[int, ...]:
         and (i in held or _diagonal(item) <= largest)
     )
     return found if len(found) <= MOST_EXCHANGING else ()
+
+
+def _can_be_traced(scene: Scene) -> bool:
+    """Test whether the CPU can follow paths: through even and closed bodies, and not too many."""
+    faces = sum(len(item.mesh.faces) for item in scene.objects)
+    if len(scene.objects) > MOST_TRACED or faces > MOST_TRACED_FACES:
+        return False
+    solids = [body for body in scene.bodies if body.sheet_thickness is None]
+    return all(body.density is None for body in scene.bodies) and all(body.mesh.diagnosis.solid for body in solids)
+
+
+def enclosed_bodies(scene: Scene) -> tuple[int, ...]:
+    """Numbers of the bodies in which light diffuses, inside the bounds of a clear body that bends light, and no other.
+
+    None where paths through that one cannot be traced.
+    """
+    bending = [
+        body for body in _clear_bodies(scene) if body.medium and body.medium.ior != 1.0 and body.sheet_thickness is None
+    ]
+    if not bending:
+        return ()
+    diffusing = {i: body for i, body in enumerate(scene.objects) if treatment_of(body) is Treatment.DIFFUSION}
+
+    def within(item: Object, bodies: Iterable[Object]) -> bool:
+        (low, high), bounds = item.bounds, [body.bounds for body in bodies if body is not item]
+        return any((low >= first).all() and (high <= last).all() for first, last in bounds)
+
+    found = tuple(i for i, body in diffusing.items() if within(body, bending) and not within(body, diffusing.values()))
+    return found if found and _can_be_traced(scene) else ()
 
 
 def _clear_bodies(scene: Scene) -> list[Object]:

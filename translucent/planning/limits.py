@@ -8,6 +8,7 @@ import numpy as np
 
 from translucent.planning.bodies import (
     emitting_bodies,
+    enclosed_bodies,
     held_objects,
     may_hold,
     open_around_eye,
@@ -333,8 +334,10 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
                 "; where lights shine from behind, bodies are up to 30 % too dark, and rims up to 40 % too bright "
                 "(finer cells, as of tl.Diffusion(48), halve both)"
             )
-        if rest := [body for body in scene.bodies if body not in bodies]:
-            inside = any(may_hold(other, body) for other in rest for body in bodies)
+        lit = [scene.objects[i] for i in enclosed_bodies(scene)]
+        rest, without = [body for body in scene.bodies if body not in bodies], [one for one in bodies if one not in lit]
+        if rest and without:
+            inside = any(may_hold(other, body) for other in rest for body in without)
             where = "up to 30 % too dark in, and up to 10 % next to" if inside else "up to 10 % too dark next to"
             text += f"; {where} {object_names(rest)}, whose light does not reach these bodies"
         ahead = [body.medium is not None and body.medium.anisotropy >= STRONGLY_AHEAD for body in bodies]
