@@ -15,7 +15,6 @@ Prints a row for each picture with isolated pixels, and writes their pictures.
 from __future__ import annotations
 
 import argparse
-import dataclasses
 from collections.abc import Callable
 from itertools import product
 from pathlib import Path
@@ -27,7 +26,6 @@ from scipy.ndimage import binary_erosion
 import translucent as tl
 from translucent.assets import mesh_path
 from translucent.geometry.solids import Box, Sphere, revolve
-from translucent.scene.camera import Window
 from translucent.scene.showcase import showcase
 
 Array = npt.NDArray[np.float64]
@@ -125,15 +123,16 @@ def main() -> None:
                 scene = showcase(mesh, tl.preset(name), size, stage=None if stage == "none" else stage)
                 frame = renderer.render(scene, size, samples=options.samples)
                 light, covered = np.asarray(frame.radiance, np.float64), np.asarray(frame.coverage)
-                found = np.argwhere(isolated(light, covered)).tolist()
-                specks = _specks(renderer, scene, light, options.samples, found)
-                pictures, totals = pictures + 1, totals + (len(specks), len(found) - len(specks))
-                if found:
-                    places = ", ".join(f"{column} {row}" for row, column in specks)
-                    print(
-                        f"{shape} {stage} {name}: {len(found)} isolated pixels, specks: {places or 'none'}", flush=True
-                    )
-                if found and options.out is not None:
+                found = isolated(light, covered)
+                pictures += 1
+                if not found.any():
+                    continue
+                finer = renderer.render(scene, (FINER * size[0], FINER * size[1]), samples=options.samples)
+                specks = np.argwhere(found & ~confirmed(light, np.asarray(finer.radiance, np.float64)))
+                totals += len(specks), found.sum() - len(specks)
+                places = ", ".join(f"{column} {row}" for row, column in specks) or "none"
+                print(f"{shape} {stage} {name}: {found.sum()} isolated pixels, specks: {places}", flush=True)
+                if options.out is not None:
                     options.out.mkdir(parents=True, exist_ok=True)
                     frame.save(options.out / f"{shape}-{stage}-{name}.png")
     print(f"{totals[0]} specks in {pictures} pictures, and {totals[1]} isolated pixels of the scenes")
@@ -142,26 +141,6 @@ def main() -> None:
 def _numbered(names: str) -> list[tuple[int, str]]:
     """Names that are separated by commas, with their numbers."""
     return list(enumerate(names.split(",")))
-
-
-def _specks(
-    renderer: tl.Renderer, scene: tl.Scene, light: Array, samples: int, found: list[list[int]]
-) -> list[list[int]]:
-    """Rows and columns of the isolated pixels that the truth does not confirm: first a part of it, then all of it."""
-    height, width, _ = light.shape
-    camera, size, side = scene.camera, (FINER * width, FINER * height), 2 * RIM + 1
-    left = []
-    for row, column in found:
-        window = Window(FINER * (column - RIM), FINER * (row - RIM), size)
-        part = dataclasses.replace(scene, camera=dataclasses.replace(camera, window=window))
-        fine = renderer.render(part, (FINER * side, FINER * side), samples=samples).radiance
-        around = light[row - RIM : row + RIM + 1, column - RIM : column + RIM + 1]
-        if not confirmed(around, np.asarray(fine, np.float64))[RIM, RIM]:
-            left.append([row, column])
-    if left:
-        there = confirmed(light, np.asarray(renderer.render(scene, size, samples=samples).radiance, np.float64))
-        left = [[row, column] for row, column in left if not there[row, column]]
-    return left
 
 
 if __name__ == "__main__":
