@@ -1,5 +1,6 @@
 """``python -m translucent`` is the command line, and so is the script ``translucent``."""
 
+import gc
 import os
 import signal
 import sys
@@ -14,6 +15,8 @@ def main() -> int:
         signal.signal(signal.SIGINT, _leave)
     # Matrices are small here, or many are multiplied at once: more threads of a BLAS would wait in busy loops.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Imports and readers of files make many objects that stay: looking for garbage each 700 takes a tenth of a second.
+    gc.set_threshold(50_000)
     from translucent.cli import main
 
     if heeds:

@@ -135,6 +135,9 @@ def one_blas_thread() -> Iterator[None]:
     For a millisecond's work more threads gain nothing, and then wait in busy loops for longer than it took. Contexts
     may be nested, and overlap in several threads: the number of threads is restored at the end of the last one.
     """
+    if os.environ.get("OPENBLAS_NUM_THREADS") == "1":  # as the command line has set it
+        yield
+        return
     with _limiting:
         _limited.append(None if _limited else _blas().limit(limits=1))
     try:

@@ -9,13 +9,16 @@ import numpy.typing as npt
 import pytest
 
 import translucent as tl
+import translucent.gpu.job as job_module
 import translucent.gpu.renderer as renderer_module
+from translucent.geometry.ray_caster import RayCaster
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu import adaptive
 from translucent.gpu.adaptive import isolated_pixels, uneven_part, wanted_samples
 from translucent.gpu.job import FrameJob
-from translucent.gpu.placement import Part
+from translucent.gpu.placement import FaceExtents, Part
 from translucent.gpu.targets import read_floats
+from translucent.scene.camera import Window
 
 Floats = npt.NDArray[np.float32]
 
@@ -213,6 +216,33 @@ def test_isolated_pixels_are_found_and_edges_are_not() -> None:
     assert found == {(4, 5), (15, 8), (12, 25)}
 
 
+@pytest.mark.parametrize(
+    "camera",
+    [
+        CAMERA,
+        tl.Camera.orthographic((0.3, 0.4, 5.0), (0, 0, 0), height=1.7),
+        dataclasses.replace(CAMERA, window=Window(12.3, 7.0, (60, 50))),
+        tl.Camera.look_at((0.2, 0.1, 0.5), (0, 0, 0), fov_y=120.0),
+    ],
+    ids=["whole", "orthographic", "part", "inside"],
+)
+def test_faces_are_found_over_the_pixels_that_they_cover(camera: tl.Camera) -> None:
+    body = tl.Object(Sphere().tessellate(24), GLASS, np.diag([1.0, -0.7, 1.2, 1.0]))
+    extents, (width, height) = FaceExtents.of(body, camera, SIZE), SIZE
+    vertices, chosen = body.world_vertices, np.random.default_rng(3).integers(0, width * height, 100)
+    caster = RayCaster(tl.Mesh(vertices, body.mesh.faces))
+    for right, down in ((0.0, 0.0), (0.5, -0.5), (-0.5, 0.4)):
+        origins, directions = (part.reshape(-1, 3) for part in camera.rays(SIZE, (right, down)))
+        hit, _ = caster.nearest(origins, directions)
+        rows, columns = np.divmod(np.arange(width * height), width)
+        for pixel in np.flatnonzero(hit >= 0)[::7]:
+            assert hit[pixel] in extents.over(columns[[pixel]], rows[[pixel]])
+        over = extents.over(columns[chosen], rows[chosen])
+        assert np.isin(hit[chosen][hit[chosen] >= 0], over).all()
+    if camera is CAMERA:
+        assert len(extents.over(np.array([20]), np.array([16]))) < 0.1 * len(body.mesh.faces)
+
+
 def test_light_is_uneven_beside_edges_alone() -> None:
     rows, columns = np.mgrid[0:40, 0:60].astype(np.float32)
     light = np.repeat((1.0 + 0.02 * columns + 0.01 * rows)[..., None], 3, axis=-1)
@@ -224,13 +254,19 @@ def test_light_is_uneven_beside_edges_alone() -> None:
 
 
 def test_isolated_pixels_are_right(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A highlight smaller than a pixel: 64 samples of its pixel are nearer to a finer picture."""
+    """A highlight smaller than a pixel: 64 samples of its pixel are nearer to a finer picture.
+
+    Only the faces over pixels that take further samples are drawn, which changes nothing.
+    """
     light = tl.DirectionalLight((-0.5, -0.6, -0.7), (3.0, 3.0, 3.0))
     scene, (width, height) = dataclasses.replace(ball(), lights=[light]), (48, 36)
+    whole = renderer.render(scene, (width, height), samples=16, interfaces=tl.TracedInterfaces(hits="embree")).radiance
+    monkeypatch.setattr(job_module, "MANY_FACES", 0)
     embree, shaders = (
         renderer.render(scene, (width, height), samples=16, interfaces=tl.TracedInterfaces(hits=hits)).radiance
         for hits in ("embree", "gl")
     )
+    np.testing.assert_array_equal(embree, whole)
     np.testing.assert_allclose(embree, shaders, rtol=1e-3, atol=1e-3)
     monkeypatch.setattr(adaptive, "ISOLATED", 1e9)
     before = renderer.render(scene, (width, height), samples=16, interfaces=tl.TracedInterfaces(hits="embree")).radiance

@@ -44,8 +44,9 @@ def test_mixed_lights_take_no_steps() -> None:
     assert max(steps[2:]) <= 3
 
 
-def test_solutions_use_one_thread_of_a_blas_which_gets_its_others_back() -> None:
+def test_solutions_use_one_thread_of_a_blas_which_gets_its_others_back(monkeypatch: pytest.MonkeyPatch) -> None:
     """Contexts that overlap, as of two threads: the first to begin is the first to end."""
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
 
     def threads() -> set[int]:
         return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}

@@ -145,6 +145,7 @@ class AdaptiveSampling:
                 clock.left = left
             self._trace_sample(job, number, shift, run_passes, leave_out)
             clock.bent(number)
+        job.choose_faces(None)
         if samples > FIRST_LOOK:
             self._settle_isolated(job, samples, run_passes)
         job.bending = False
@@ -208,6 +209,7 @@ class AdaptiveSampling:
                 marks[block.bottom : block.top, block.left : block.right] = 1.0
         finally:
             entered.scissor = None
+            job.choose_faces(None)
         job.unsettled = {"unsettled": pixel_words(marks > 0.0), "mirror_unsettled": np.zeros(0, np.uint32)}
         if job.mirror is not None:
             job.targets["mirror_unsettled"].clear()
@@ -295,6 +297,8 @@ class AdaptiveSampling:
             left += self._mark(job, *names, part, {**uniforms, "wanted": self._wanted, "measures": 0})
             if job.plan.hits == "embree":
                 job.unsettled[names[1]] = pixel_words(read_floats(job.targets[names[1]], 0, 1) > 0.0)
+        if taken and job.unsettled:
+            job.choose_faces(np.concatenate(list(job.unsettled.values())))
         return left
 
     def _mark(self, job: FrameJob, source: str, mask: str, part: Part, values: dict[str, float]) -> int:

@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Integers
 from translucent.gpu.diffusion import DiffusedTexture, density_uniforms, ground_uniforms, scene_grids
 from translucent.gpu.features import FrameFeatures
 from translucent.gpu.layout import (
@@ -31,6 +31,7 @@ from translucent.gpu.light_cameras import media_sphere
 from translucent.gpu.placement import (
     Balance,
     FaceCounts,
+    FaceExtents,
     Part,
     PlacedScene,
     SampleView,
@@ -64,6 +65,9 @@ from translucent.planning.render_plan import RenderPlan
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.camera import Camera, Window
 from translucent.scene.grounds import Mirror, mirror_of
+
+#: Faces of an object from which on it takes longer to draw all than to choose those over some pixels.
+MANY_FACES = 1 << 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,13 +208,21 @@ class CameraView:
         self.resources = resources
         self.uniforms = UniformBuffers(gl, placed, roles, contents)
 
-    def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
-        """Draw objects with the current state; front faces are those where a ray enters."""
+    def draw(
+        self, program: moderngl.Program, objects: tuple[int, ...], faces: Mapping[int, Integers] | None = None
+    ) -> None:
+        """Draw objects with the current state; front faces are those where a ray enters.
+
+        Of objects whose numbers `faces` has, only these faces (k,).
+        """
         for i in objects:
             body = self.scene.objects[i]
             self.uniforms.bind_body(i)
             self.gl.front_face = "cw" if body.faces_inwards else "ccw"
-            self.resources.meshes[body.mesh].vertex_array(program, body.mesh).render()
+            if faces is None or i not in faces:
+                self.resources.meshes[body.mesh].vertex_array(program, body.mesh).render()
+            else:
+                self.resources.meshes[body.mesh].draw_faces(program, body.mesh, faces[i])
         self.gl.front_face = "ccw"
 
 
@@ -267,6 +279,8 @@ class FrameJob(CameraView):
         Of a job that is bending: pixels that need more samples, by the name of their target.
     enlarged : list of (int, int), optional
         Columns and rows of pixels whose parts are drawn, each as a block of pixels from the top left corner on.
+    faces : dict of int to (k,) int
+        By number of the object: faces that are drawn of its interface, where it is not all of them.
     few_opaque : bool
         Opaque objects are shaded in a few samples, before all others, which show the mean of these.
     uneven : Part, optional
@@ -330,6 +344,7 @@ class FrameJob(CameraView):
         self._cleared: set[str] = set()
         self._lit = False
         self._packed: tuple[tuple[Fields, ...] | None, npt.NDArray[np.float32]] | None = None
+        self.faces: dict[int, Integers] = {}
         self._extents = extents(scene.boxes, scene.radii, scene.camera, targets.size)
         self._in_view = frozenset(np.flatnonzero(self._extents[:, 2] > self._extents[:, 0]).tolist())
         if self.features.marches and not self.features.scatters:
@@ -388,12 +403,29 @@ class FrameJob(CameraView):
         camera, size, parts = self.scene.camera, self.targets.size, block.right - block.left
         window = camera.window or Window(0, 0, size)
         left, top = parts * (window.left + column) - block.left, parts * (window.top + row) - block.bottom
+        self.choose_faces(np.array([row << 15 | column], np.uint32))
         enlarged = Window(left, top, (parts * window.whole[0], parts * window.whole[1]))
         self.uniforms.place(SampleView(replace(camera, window=enlarged), size))
 
-    def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
+    def draw(
+        self, program: moderngl.Program, objects: tuple[int, ...], faces: Mapping[int, Integers] | None = None
+    ) -> None:
         """Draw the objects that are in view, with the current state."""
-        super().draw(program, tuple(i for i in objects if i in self._in_view))
+        super().draw(program, tuple(i for i in objects if i in self._in_view), faces)
+
+    def choose_faces(self, pixels: npt.NDArray[np.uint32] | None) -> None:
+        """Draw interfaces from now on where they may cover these pixels (n,), as `pixel_words` has them; None: all."""
+        self.faces = {}
+        if pixels is not None:
+            columns, rows = pixels & np.uint32(0x7FFF), pixels >> np.uint32(15)
+            self.faces = {i: found.over(columns, rows) for i, found in self._face_extents.items()}
+
+    @cached_property
+    def _face_extents(self) -> dict[int, FaceExtents]:
+        """Extents of the faces of the objects with many of them."""
+        camera, objects = self.scene.camera, self.scene.objects
+        many = (i for i in sorted(self._in_view) if len(objects[i].mesh.faces) >= MANY_FACES)
+        return {i: FaceExtents.of(objects[i], camera, self.targets.size) for i in many}
 
     def light(self, lights: LightLookup) -> None:
         """Write the uniforms of the lights that media scatter; they are the same for all samples."""

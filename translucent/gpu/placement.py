@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from translucent.arrays import Array, Mask
+from translucent.arrays import Array, Integers, Mask
 from translucent.gpu.constants import CONSTANTS
 from translucent.planning.bodies import open_around_eye
 from translucent.planning.methods import Method
@@ -292,6 +293,59 @@ def part_of(edges: Array, shift: tuple[float, float], size: tuple[int, int]) -> 
     first = np.clip(np.floor(low + moved - _MARGIN), 0, size).astype(int).tolist()
     last = np.clip(np.ceil(high + moved + _MARGIN), 0, size).astype(int).tolist()
     return Part(first[0], first[1], last[0], last[1])
+
+
+#: Pixels by which samples may be farther off the center of theirs than its sides, and rasterizers round.
+_BEYOND = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class FaceExtents:
+    """Pixels that each of the faces of an object may cover in samples of a picture, whose top left pixel is 0, 0.
+
+    Attributes
+    ----------
+    low, high : (2, n) int32
+        First column and row, and those after the last.
+    """
+
+    low: npt.NDArray[np.int32]
+    high: npt.NDArray[np.int32]
+
+    @classmethod
+    def of(cls, body: Object, camera: Camera, size: tuple[int, int]) -> FaceExtents:
+        """Extents before a camera; of faces that reach behind the eye all of the picture."""
+        right, up, ahead = np.stack([camera.right, camera.up, camera.forward]) @ (body.world_vertices - camera.eye).T
+        flat, faces, limits = camera.fov_y is None, body.mesh.faces.T, np.array(size)[:, None]
+        behind = np.zeros(len(ahead), bool) if flat else ahead <= _ROUNDING * body.mesh.diagonal
+        distance = 1.0 if flat else np.where(behind, 1.0, ahead)
+        center, middle = camera.center(size)
+        off = np.stack([right, -up]) / distance / np.array(camera.half_extent(size))[:, None]
+        pixels = np.clip(0.5 * limits * (1.0 + off - [[center], [-middle]]), -1.0, limits + 1.0)
+        low, high = (np.where(behind, edge, pixels) for edge in (0.0, limits))
+        low = np.minimum.reduce([low[:, corner] for corner in faces])
+        high = np.maximum.reduce([high[:, corner] for corner in faces])
+        edges = np.floor(low - _BEYOND), np.floor(high + _BEYOND) + 1.0
+        return cls(*(np.clip(edge, 0, limits).astype(np.int32) for edge in edges))
+
+    def over(self, columns: npt.NDArray[np.integer], rows: npt.NDArray[np.integer]) -> Integers:
+        """Faces (k,), in their order, that may cover any of the pixels in columns (n,) and rows (n,)."""
+        if not len(columns):
+            return np.zeros(0, np.int64)
+        first, last = (np.array([end(columns), end(rows)], np.int64)[:, None] for end in (np.min, np.max))
+        near = np.flatnonzero(((self.low <= last) & (self.high > first)).all(axis=0))
+        if len(columns) == 1:
+            return near
+        (width,), (height,) = last - first + 1
+        # Each entry has the number of pixels left of and above it.
+        total = np.zeros((height + 1, width + 1), np.int64)
+        places = (rows - first[1]) * width + (columns - first[0])
+        total[1:, 1:] = np.bincount(places, minlength=width * height).reshape(height, width)
+        total = total.cumsum(axis=0).cumsum(axis=1)
+        ends = (edge[:, near] - first for edge in (self.low, self.high))
+        (left, top), (right, bottom) = (np.clip(end, 0, [[width], [height]]) for end in ends)
+        found = total[bottom, right] - total[top, right] - total[bottom, left] + total[top, left]
+        return np.asarray(near[found > 0])
 
 
 #: Count that is invalid in every pixel.

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from translucent.arrays import Integers
 from translucent.geometry.mesh import Mesh, unit_normals
 from translucent.geometry.normals import drawn_normals
 from translucent.gpu.diffusion import DiffusionCache, GridTexture
@@ -46,22 +48,41 @@ class MeshBuffers:
         Shared vertices; or where it reads ``normal``, flat faces; or for ``corner_normal``, faces that look smooth.
         """
         if (array := self._arrays.get(program.glo)) is None:
-            if "corner_normal" in program or ("uv" in program and "normal" not in program):
-                # What only emits has no use for normals.
-                read = [name for name in ("offset", "corner_normal", "uv") if name in program]
-                layout = f"3f {'3f' if 'corner_normal' in read else '12x'} {'2f' if 'uv' in read else '8x'}"
-                content = [(self._smooth_faces(mesh), layout, *read), *self._corner_looks(program, mesh)]
-                array = self._gl.vertex_array(program, content)
-            elif "normal" in program:
-                content = [(self._flat_faces(mesh), "3f 3f", "offset", "normal")]
-                if "uv" in program:
-                    content.append((self._of_corners("uv", mesh.uv, mesh), "2f", "uv"))
-                array = self._gl.vertex_array(program, [*content, *self._corner_looks(program, mesh)])
-            else:
-                content = [(self.offsets, "3f", "offset")]
-                array = self._gl.vertex_array(program, content, self.indices, index_element_size=4)
-            self._arrays[program.glo] = array
+            content = self._content(program, mesh)
+            indices = self.indices if self._shares(program) else None
+            array = self._arrays[program.glo] = self._gl.vertex_array(program, content, indices, index_element_size=4)
         return array
+
+    def draw_faces(self, program: moderngl.Program, mesh: Mesh, faces: Integers) -> None:
+        """Draw some faces (k,) of the mesh."""
+        if not len(faces):
+            return
+        corners = mesh.faces[faces] if self._shares(program) else 3 * faces[:, None] + np.arange(3)
+        indices = self._gl.buffer(corners.astype(np.int32))
+        array = self._gl.vertex_array(program, self._content(program, mesh), indices, index_element_size=4)
+        array.render()
+        array.release()
+        indices.release()
+
+    @staticmethod
+    def _shares(program: moderngl.Program) -> bool:
+        """True if faces share their vertices, as the program reads positions alone."""
+        return not any(name in program for name in ("corner_normal", "normal", "uv"))
+
+    def _content(self, program: moderngl.Program, mesh: Mesh) -> list[tuple[Any, ...]]:
+        """Buffers of the inputs of a program, with their layouts and names."""
+        if self._shares(program):
+            return [(self.offsets, "3f", "offset")]
+        if "normal" in program:
+            content: list[tuple[Any, ...]] = [(self._flat_faces(mesh), "3f 3f", "offset", "normal")]
+            if "uv" in program:
+                content.append((self._of_corners("uv", mesh.uv, mesh), "2f", "uv"))
+        else:
+            # What only emits has no use for normals.
+            read = [name for name in ("offset", "corner_normal", "uv") if name in program]
+            layout = f"3f {'3f' if 'corner_normal' in read else '12x'} {'2f' if 'uv' in read else '8x'}"
+            content = [(self._smooth_faces(mesh), layout, *read)]
+        return [*content, *self._corner_looks(program, mesh)]
 
     def _corner_looks(self, program: moderngl.Program, mesh: Mesh) -> list[tuple[moderngl.Buffer, str, str]]:
         """Colors of the vertices, for a program that reads them."""

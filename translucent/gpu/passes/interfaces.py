@@ -77,7 +77,7 @@ class InterfacesPass:
                 held = program, surface
             if holes:
                 set_uniform(program, "hole_below", surface.alpha_cutoff)
-            job.draw(program, (i,))
+            job.draw(program, (i,), job.faces)
 
 
 _PLAIN_SAMPLERS = (

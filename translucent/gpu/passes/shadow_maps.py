@@ -8,13 +8,13 @@ from __future__ import annotations
 import contextlib
 import itertools
 import weakref
-from collections.abc import Callable, Container, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import moderngl
 import numpy as np
 
-from translucent.arrays import Array
+from translucent.arrays import Array, Integers
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.job import FrameJob
 from translucent.gpu.layout import SHADOWS, SKY_SHADOWS
@@ -121,14 +121,16 @@ class MapJob(FrameJob):
         if len(views) > 1:
             self.uniforms.place_before([view.camera for view in views], center)
 
-    def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
+    def draw(
+        self, program: moderngl.Program, objects: tuple[int, ...], faces: Mapping[int, Integers] | None = None
+    ) -> None:
         """Draw the objects into each of the maps."""
         for number, view in enumerate(self._views):
             if len(self._views) > 1:
                 self._view = view
                 self.accumulator()
                 self.uniforms.choose(number)
-            super().draw(program, objects)
+            super().draw(program, objects, faces)
 
     def roles_of(self, counts: FaceCounts) -> BodyRoles:
         """Roles of the objects, with the slots of two media."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, cast
 
 import moderngl
 
+from translucent.arrays import Integers
 from translucent.formulas.sampling import sample_shifts
 from translucent.gpu.job import CameraView, FrameJob
 from translucent.gpu.layout import BODY_STRIDE, SHADOWS
@@ -32,7 +34,9 @@ class RecordedJob(FrameJob):
         super().place(shift, with_depth=with_depth)
         self.covered = Part(0, 0, *self.targets.size)
 
-    def draw(self, program: moderngl.Program, objects: tuple[int, ...]) -> None:
+    def draw(
+        self, program: moderngl.Program, objects: tuple[int, ...], faces: Mapping[int, Integers] | None = None
+    ) -> None:
         """Draw objects with the current state."""
         CameraView.draw(self, program, objects)
 
