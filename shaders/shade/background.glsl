@@ -1,5 +1,5 @@
 // What is behind the media: opaque surfaces, or the environment. Needs <constants>, <View> and <Environment>. SEEN_MAP: the
-// environment is no picture (0), one of its own (1), or the one that lights (2).
+// environment is no picture (0), one of its own (1), or the one that lights (2). seen_checkerboard: it is a checkerboard.
 
 #include "lib/environment.glsl"
 #include "shade/light_map.glsl"
@@ -20,12 +20,8 @@ vec3 background_radiance(vec2 at, vec3 ray) {
 #if SEEN_MAP
     return seen_scale * textureLod(seen_map, equirectangular_uv(ray, seen_turn), 0.0).rgb;
 #else
-    float fraction = 0.0;
-    if (seen_kind == ENVIRONMENT_GRADIENT) {
-        fraction = gradient_share(ray);
-    } else if (seen_kind == ENVIRONMENT_CHECKERBOARD) {
-        fraction = checkerboard_share(at, seen_tiles);
-    }
+    // A constant one is a gradient between equal radiances.
+    float fraction = seen_checkerboard ? checkerboard_share(at, seen_tiles) : gradient_share(ray);
     return seen_scale * mix(seen_first.rgb, seen_second.rgb, fraction);
 #endif
 }

@@ -28,8 +28,7 @@ vec3 environment_beyond(vec3 point, vec3 direction, float roughness) {
     float fraction = blurred_checkerboard_fraction(in_heights(wall.xy), seen_tiles, heights * seen_tiles);
     return seen_scale * mix(seen_first.rgb, seen_second.rgb, fraction);
 #else
-    float fraction = seen_kind == ENVIRONMENT_GRADIENT ? gradient_share(direction) : 0.0;
-    return seen_scale * mix(seen_first.rgb, seen_second.rgb, fraction);
+    return seen_scale * mix(seen_first.rgb, seen_second.rgb, gradient_share(direction));
 #endif
 }
 

@@ -1,6 +1,6 @@
 // The interface of a body where a ray first enters it, or first leaves one: its normal, axial depth and material.
 // BACK: where it leaves; BEYOND: farther than what has been entered, or else ahead of the eye; EXITS: where the intervals
-// say that it leaves all bodies. HOLES: of a sheet whose alpha makes some.
+// say that it leaves all bodies. HOLES: of a sheet whose alpha makes some. LIGHTS: highlights need the variance of normals.
 
 #include <constants>
 #include <View>
@@ -43,7 +43,11 @@ layout(location = 2) out vec4 out_color;  // w: fraction of the light of the env
 void main() {
     // All that takes derivatives comes first: they are undefined where a neighbor has been discarded.
     vec3 normal = mapped_normal(normalize(world_normal), from_eye, surface_uv);
+#if LIGHTS
     float variance = packed_variance(normal_variance(SURFACE_TEXTURES == 1 ? normal : world_normal, from_eye).xyz);
+#else
+    const float variance = 0.0;
+#endif
     float roughness = surface_roughness * textured_roughness(surface_uv).g;
     float transmission = surface_color.w * textured_transmission(surface_uv);
 #if !BACK

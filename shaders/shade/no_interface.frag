@@ -8,6 +8,7 @@
 #include <Environment>
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
+#define seen_checkerboard (seen_kind == ENVIRONMENT_CHECKERBOARD)
 #include "shade/background.glsl"
 #if STRAIGHT_LIGHT
 #include <ObjectRow>

@@ -11,6 +11,7 @@
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
 #include "lib/two_stream.glsl"
+const bool seen_checkerboard = CHECKERBOARD == 1;
 #include "shade/background.glsl"
 #include "shade/environment_light.glsl"
 #include "shade/interface_light.glsl"

@@ -45,6 +45,7 @@ flat in vec4 seen_other;
 #else
 #define seen_kind int(seen_other.y)
 #endif
+#define seen_checkerboard (seen_kind == ENVIRONMENT_CHECKERBOARD)
 #include "shade/background.glsl"
 #endif
 

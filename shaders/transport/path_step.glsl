@@ -9,6 +9,7 @@
 #include "lib/phase.glsl"
 #include "lib/ray.glsl"
 #include "shade/lights.glsl"
+const bool seen_checkerboard = CHECKERBOARD == 1;
 #include "shade/background.glsl"
 #include "shade/environment_light.glsl"
 #include "shade/environment_beyond.glsl"

@@ -7,6 +7,7 @@
 #include "lib/color.glsl"
 #include "lib/optics.glsl"
 #include "lib/ray.glsl"
+const bool seen_checkerboard = CHECKERBOARD == 1;
 #include "shade/background.glsl"
 #include "shade/environment_light.glsl"
 #include "shade/environment_beyond.glsl"

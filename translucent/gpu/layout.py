@@ -93,7 +93,7 @@ class PackedTable:
         """Structured dtype with the offsets of std140, so that no field begins in one texel and ends in the next."""
         return _std140(self.fields)
 
-    @property
+    @cached_property
     def glsl(self) -> str:
         """Declaration of struct and texture, and the function that reads a record."""
         members = "".join(f"    {_TYPES['f', shape][0]} {name};\n" for name, _, shape in self.fields)

@@ -53,6 +53,7 @@ class InterfacesPass:
             if exits:
                 self._variants.bind(ordered_layers=job.targets["ordered"].color_attachments[2])
             switches = {"BACK": back, "BEYOND": beyond, "EXITS": exits, "OPAQUE": job.features.has_opaque}
+            switches["LIGHTS"] = bool(job.scene.lights)
             self._draw(job, switches, solids)
             if not back:
                 job.gl.enable_only(moderngl.DEPTH_TEST)

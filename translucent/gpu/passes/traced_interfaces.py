@@ -122,7 +122,7 @@ class TracedInterfacesPass:
             "enlarges": int(job.enlarged is not None),
             "faintest_throughput": faintest_throughput(forks),
             "most_interfaces": depth,
-            "microfacet_points": microfacet_points(job.sample),
+            **({"microfacet_points": microfacet_points(job.sample)} if switches["MICROFACETS"] else {}),
             "blurred_fraction": 0.0 if job.plan.request.denoise else blurred_fraction(job.samples),
             "sample_width": job.samples**-0.5,
             "sample_area": job.sample_area,
