@@ -32,7 +32,7 @@ from translucent.diffusion.keys import dimming_key, environment_key, kept, light
 from translucent.diffusion.lit_body import LitBody
 from translucent.diffusion.photons import EnteringPhotons
 from translucent.diffusion.sides import GridPlacement, beside
-from translucent.diffusion.solution import BodySystem, DiffuseSolution
+from translucent.diffusion.solution import LEAST_ON_PATHS, BodySystem, DiffuseSolution
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface, exit_quadrature
 from translucent.formulas.diffusion import (
@@ -53,9 +53,6 @@ from translucent.scene.scene import Light, Object, Scene
 
 #: Values in cells: (6, x, y, z, 3) for each side of a surface, or (2 x, 3 y, z, 3) beside each other.
 Volume = npt.NDArray[np.float32]
-
-#: Least fraction of the paths through a body on which light counts as scattered: thinner parts hardly scatter.
-LEAST_SCATTERED = 0.002
 
 #: Mean cosine of scattering, at least, of media without an interface whose light is seen by the angle that it turns by
 #: at first events. Behind an interface light enters and leaves in a cone, and that angle is about the same for all.
@@ -471,7 +468,7 @@ def _field(lit: LitBody, medium: Medium, interface: BodyInterface, found: Diffus
     total = reduced + np.asarray(medium.absorption)
     albedo = np.where(total > 0.0, reduced / np.where(total > 0.0, total, 1.0), 0.0)
     polished, brightness = diffuse_interface(interface.ior), np.reshape(interface.brightness, (-1, 1))
-    scattered = np.maximum(found.scattered, LEAST_SCATTERED)
+    scattered = np.maximum(found.scattered, LEAST_ON_PATHS)
     directed = interface.ior == 1.0 and abs(medium.anisotropy) >= DIRECTED
     parts: list[tuple[Array, Array | float]] = [
         (brightness * found.fluence, found.inside),

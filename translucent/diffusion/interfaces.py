@@ -175,6 +175,8 @@ class BodyInterface:
         Flux that enters in uniform light, over that where most of what is around is.
     brightness : float, or (s,) float64
         Factor for a surface whose light is looked up as if `main` was its interface.
+    enclosed : bool
+        Whether paths through the interfaces of clear bodies around it are followed, and on through the body.
     """
 
     ior: float
@@ -185,6 +187,7 @@ class BodyInterface:
     exit_share: Array | float
     uniform: Array | float = 1.0
     brightness: Array | float = 1.0
+    enclosed: bool = False
 
     @classmethod
     def of(cls, ior: float, roughness: float, outside: Array | None = None) -> BodyInterface:
@@ -222,6 +225,7 @@ class BodyInterface:
             each([one.exit_share for one in every]),
             each([one / sent[most] for one in sent]),
             each([one / seen[most] for one in seen]),
+            outside is not None,
         )
 
 

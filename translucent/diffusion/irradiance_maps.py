@@ -2,8 +2,7 @@
 
 Random paths from samples of each object's surface gather it: they end at the environment, or at opaque objects, which
 light each other in a few rounds. Pictures look it up in a volume around the object, by the normal. Paths from samples
-of a body in which light diffuses end there and at such bodies, too: at itself where a clear body around it reflects the
-body's light back inside.
+of a body in which light diffuses come to such bodies, too: back to itself where a clear body around it reflects light.
 
 References
 ----------
@@ -14,7 +13,7 @@ Shirley, Hubbard & Greenberg 1998, "The irradiance volume".
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
@@ -22,17 +21,23 @@ import numpy.typing as npt
 from scipy import sparse
 
 from translucent.arrays import Array, Floats, Integers
-from translucent.diffusion.entering import Pose, dimming_bodies, light_passed, radiance_without_suns, windings_at
+from translucent.diffusion.entering import (
+    Pose,
+    dimming_bodies,
+    light_passed,
+    opaque_surfaces,
+    radiance_without_suns,
+    windings_at,
+)
 from translucent.diffusion.entering_rays import EnteringRays, two_of_many
 from translucent.diffusion.exchange import ROUNDS, OpaqueSurfaces, cosine_directions, direct_irradiance, hemispheres
 from translucent.diffusion.grid import BodyGrid, body_grid, nearest_samples
 from translucent.diffusion.lit_body import LitBody, own_frame
-from translucent.diffusion.photons import BATCH, MOST_SURFACES, Photons, PhotonSegmentTracer, joined
+from translucent.diffusion.photons import BATCH, MOST_SURFACES, Photons, PhotonSegments, PhotonSegmentTracer, joined
 from translucent.diffusion.sides import GridPlacement, SurfaceSides, beside
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.formulas.interface import refracted_direction
-from translucent.planning.rendered import Treatment, treatment_of
 from translucent.scene.scene import Object, Scene
 
 #: Samples on each object, of all together, and paths from each: the fit of the volume takes the mean of about 16.
@@ -264,7 +269,7 @@ class PathExchange:
         return any(one.nnz for one in self.itself)
 
     def returned(self, leaving: Array, channel: int) -> Array:
-        """(s,): flux that enters in a color channel for a flux (s,) that leaves."""
+        """(s,): flux that enters in a color channel for a flux (s,) that leaves where all light is scattered."""
         return np.asarray(self.mean @ (self.itself[channel] @ leaving))
 
     def from_others(self, leaving: Array, passing: Array) -> Array:
@@ -277,7 +282,7 @@ class PathExchange:
 class EnclosedPaths:
     """Paths from the samples of a body, backwards along the light that falls on it through interfaces.
 
-    They carry L / n^2, which refraction leaves as it is. Diffusing bodies end them, and opaque objects scatter them.
+    They carry L / n^2, which refraction leaves as it is, less what media take. Opaque objects scatter them.
 
     Parameters
     ----------
@@ -302,17 +307,17 @@ class EnclosedPaths:
         starts = points + _ABOVE * self._grid.cells.step * normals
         count = len(points)
         self._rays = int(np.clip(PATHS // max(count, 1), FEWEST, MOST))
-        objects = [
-            Object(item.mesh, None, item.transform) if treatment_of(item) is Treatment.DIFFUSION else item
-            for item in scene.objects
-        ]
-        self._scene = replace(scene, objects=objects, lights=(), environment_shadows=0)
-        self._tracer = PhotonSegmentTracer(self._scene, np.random.default_rng(0))
-        self._surfaces = OpaqueSurfaces(self._scene.opaque)
-        numbers = {id(item): k for k, item in enumerate(self._surfaces.objects)}
-        self._opaque = np.array([numbers.get(id(item), -1) for item in objects])
+        self._tracer = PhotonSegmentTracer(scene, np.random.default_rng(0))
+        self._surfaces = opaque_surfaces(scene.opaque)
+        #: Number of the first face of each object among those of the opaque ones.
+        firsts = (
+            {}
+            if self._surfaces is None
+            else dict(zip(map(id, self._surfaces.objects), self._surfaces.first, strict=False))
+        )
+        self._first = np.array([firsts.get(id(item), -1) for item in scene.objects])
         owner, directions = hemispheres(normals, self._rays)
-        inside = windings_at(self._scene, starts, normals)[owner]
+        inside = windings_at(scene, starts, normals)[owner]
         begun = self._tracer.begun_at(starts[owner], directions, np.ones((len(owner), 3)), inside)
         indices = self._tracer.iors_around(begun)
         self.outside: Array = indices.reshape(count, -1)[:, 0]
@@ -341,27 +346,32 @@ class EnclosedPaths:
             if not len(going.number):
                 return
             step = self._tracer.step(going)
+            self._scatter(step.segments, going.number[~np.isin(going.number, step.left.number)])
             self._left.append((step.left.number, step.left.directions, step.left.power))
-            going = joined((step.going, self._land(step.landed)))
+            going = step.going
+            if self._surfaces is not None:
+                going = joined((going, self._land(step.landed, self._surfaces)))
 
-    def _land(self, landed: Photons) -> Photons:
-        """End paths at bodies in which light diffuses; on opaque objects they go on, diffusely."""
-        item, face = self._tracer.surfaces_of(landed)
+    def _scatter(self, segments: PhotonSegments, number: Integers) -> None:
+        """Light that bodies scatter onto segments of the paths of numbered rays, where these come into the bodies."""
         for k, other in self._lit.items():
-            at = np.flatnonzero(item == k)
-            sample = other.nearest_sample(landed.origins[at])
-            self._links.append((np.full(len(at), k), landed.number[at], sample, landed.power[at]))
-        at = np.flatnonzero(~np.isin(item, list(self._lit)))
-        further = landed.where(at)
-        number = self._surfaces.first[self._opaque[item[at]]] + face[at]
-        reflected, emitted = self._surfaces.light(number, further.origins)
-        normals = self._surfaces.normals(number)
-        normals = np.where((normals * further.directions).sum(axis=1, keepdims=True) > 0.0, -normals, normals)
-        fraction = further.power * reflected
-        self._met.append((further.number, further.origins, normals, fraction, further.power * emitted))
-        further.power = fraction
-        further.directions = cosine_directions(normals, *self._tracer.rng.random((2, len(at))))
-        return further
+            at = np.flatnonzero(segments.filling[:, k] > 0.0)
+            power = segments.power[at] * optics.opacity(segments.extinction[at] * segments.length[at, None])
+            sample = other.nearest_sample(segments.origins[at])
+            self._links.append((np.full(len(at), k), number[at], sample, power))
+
+    def _land(self, landed: Photons, surfaces: OpaqueSurfaces) -> Photons:
+        """Paths that go on from opaque objects, diffusely."""
+        item, face = self._tracer.surfaces_of(landed)
+        number = self._first[item] + face
+        reflected, emitted = surfaces.light(number, landed.origins)
+        normals = surfaces.normals(number)
+        normals = np.where((normals * landed.directions).sum(axis=1, keepdims=True) > 0.0, -normals, normals)
+        fraction = landed.power * reflected
+        self._met.append((landed.number, landed.origins, normals, fraction, landed.power * emitted))
+        landed.power = fraction
+        landed.directions = cosine_directions(normals, *self._tracer.rng.random((2, len(item))))
+        return landed
 
     @property
     def meets_opaque(self) -> bool:
@@ -405,7 +415,7 @@ class EnclosedPaths:
         dimming = dimming_bodies(scene, -1)
         for ray, points, normals, fraction, emitted in self._met:
             add(found, ray, emitted)
-            if len(ray) and scene.lights:
+            if len(ray) and scene.lights and self._surfaces is not None:
                 passed = partial(light_passed, dimming)
                 direct = direct_irradiance(points, normals, scene.lights, self._surfaces.caster, passed)
                 add(found, ray, fraction * direct / np.pi)

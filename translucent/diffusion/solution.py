@@ -75,6 +75,9 @@ LEAST_ABSORBED = 0.1
 #: Least fraction of the fluence that was last scattered by the medium, and not by an inclusion.
 LEAST_SCATTERED = 0.05
 
+#: Least fraction of the paths through a body on which light counts as scattered: thinner parts hardly scatter.
+LEAST_ON_PATHS = 0.002
+
 #: Least fraction of a cell's volume that absorbs.
 _LEAST_ABSORBING = 0.02
 
@@ -134,7 +137,10 @@ class DiffuseSolution:
 
 
 class Returned(Protocol):
-    """Flux (s,) that enters a body again in a color channel, for a flux (s,) that leaves it."""
+    """Flux (s,) that enters a body again in a color channel, for a flux (s,) that leaves it.
+
+    Of a body inside clear ones, see `BodyInterface.enclosed`, what leaves it on paths on which all light is scattered.
+    """
 
     def __call__(self, leaving: Array, channel: int) -> Array:
         """(s,): flux that enters."""
@@ -367,6 +373,7 @@ class _ChannelSystem:
         chord = 4.0 * float(dense.cells @ grid.volumes) / (grid.area * len(depth))
         # Of diffusion, and of all events.
         self._extinctions = extinction, absorption + scattering / (1.0 - phase.mean_cosine)
+        self._enclosed = interface.enclosed
         self._ior, self._chord, self._interface = ior, chord, interface.main
         self._even = np.broadcast_to(np.asarray(interface.uniform, np.float64), len(depth))
         self._walls = walls
@@ -574,6 +581,9 @@ class _ChannelSystem:
         def received(fluence: Array, flux: Array) -> Array:
             if returned is None:
                 return entering
+            if self._enclosed:  # paths follow the rest
+                sent = self._exit_fraction * fluence + unscattered
+                return entering + returned(sent / np.maximum(self.scattered, LEAST_ON_PATHS))
             # Light that nothing scatters or absorbs on its way through falls on other parts, too; rays see it alone.
             return entering + returned(leaving(fluence, flux) + self.through * flux)
 
