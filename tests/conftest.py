@@ -41,6 +41,10 @@ v.validateBytes(new Uint8Array(fs.readFileSync(file)), {externalResourceFunction
   .then(r => console.log(JSON.stringify(r.issues)));
 """
 
+# What help and tracebacks look like does not depend on who runs the tests.
+os.environ["COLUMNS"] = "80"
+os.environ.pop("FORCE_COLOR", None)
+
 settings.register_profile("project", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("project")
 

@@ -44,9 +44,9 @@ from translucent.commands.console import echo
 )
 @pytest.mark.parametrize("verb", ["render", "explain"])
 def test_a_bad_model_is_refused(
-    run: Run, tmp_path: Path, verb: str, name: str, content: bytes | None, message: str
+    run: Run, in_tmp_path: Path, verb: str, name: str, content: bytes | None, message: str
 ) -> None:
-    model, output = tmp_path / name, tmp_path / "out.png"
+    model, output = Path(name), Path("out.png")
     if content is not None:
         model.write_bytes(content)
     result = run(verb, model, *(["-o", output] if verb == "render" else []))
@@ -95,9 +95,9 @@ def test_bad_usage_is_one_line_and_exit_code_2(run: Run, arguments: list[str], m
     assert message in one_error_line(result)
 
 
-def test_debug_shows_the_traceback(run: Run, tmp_path: Path) -> None:
+def test_debug_shows_the_traceback(run: Run, in_tmp_path: Path) -> None:
     with pytest.raises(tl.InputError, match="no file has this path"):
-        run("explain", tmp_path / "missing.obj", "--debug")
+        run("explain", "missing.obj", "--debug")
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["render", "--help"], ["explain", "-h"], ["extinction", "--help"]])

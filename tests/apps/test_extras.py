@@ -52,7 +52,7 @@ def test_a_missing_package_is_told_with_its_extra(
     (tmp_path / "sky.exr").write_bytes(b"")
     monkeypatch.setenv("DISPLAY", ":99")
     uninstalled(module)
-    words = arguments.format(folder, here=tmp_path / "sky.exr").split()
+    words = [word.format(folder, here=tmp_path / "sky.exr") for word in arguments.split()]
     line = one_error_line(run(*words), 1)
     assert f"the package {module} is not installed; pip install 'translucent-shading[{extra}]'" in line
     assert not list(folder.iterdir())
