@@ -193,8 +193,10 @@ def is_composed(model: str) -> bool:
         return False
     if model in scene_names() or Path(model).suffix.lower() == ".toml":
         return True
-    words = _words(model)
-    return len(words) > 1 or any(_divided(word)[1] for word in words)
+    words = [_divided(word) for word in _words(model)]
+    # Folders without a model among the words: the text is one path, whose name has spaces.
+    known = os.sep not in model or any(os.path.lexists(head) or head in mesh_names() for head, _ in words)
+    return any(material for _, material in words) or (len(words) > 1 and known)
 
 
 def joined(models: tuple[str, ...]) -> str:
