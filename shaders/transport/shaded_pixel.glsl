@@ -61,7 +61,11 @@ void trace_channels(Pixel pixel, Ray ray, PrimaryHit primary, float reach) {
 // Radiance of a pixel, and its transmittance; alpha: how many samples this counts as, and the fraction of its light that can be
 // trusted.
 void shade_pixel(Pixel pixel, out vec4 out_radiance, out vec4 out_transmittance) {
+#if EMISSION
     vec3 emitted = texelFetch(emitted_radiance_sum, pixel.here, 0).rgb;
+#else
+    const vec3 emitted = vec3(0.0);
+#endif
     vec3 through = texelFetch(straight_transmittance, pixel.here, 0).rgb;
     Ray ray;
     PrimaryHit primary;
