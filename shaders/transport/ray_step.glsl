@@ -314,12 +314,15 @@ int branch(inout Ray ray, out Ray weaker, Ray back, Ray on, vec3 again, bool tot
     return NONE;
 }
 
+vec3 face_outwards = vec3(0.0);  // unit normal of the face of the last interaction, out of the body
+
 // The interaction of a ray with an interface; returns which branches go on. again, last: as for `branch`.
 int interact(inout Ray ray, out Ray weaker, Interaction at, ObjectRow body, Hit hit, SurfaceHit surface, PrimaryHit primary, float unoccluded,
     vec3 again, bool last) {
     int depth = depth_of(ray) + 1, interactions = interactions_of(ray) - 1;
     bool polished = at.roughness == 0.0;
     float alpha = at.roughness * at.roughness;
+    face_outwards = at.outside ? at.face_normal : -at.face_normal;
     Facet facet = take_facet(at, alpha, primary.pixel, depth - 1, ray.branch_code);
 #if ROUGH
     float bare = interface_reflectance(cosine_of(at), at.ior, at.roughness);

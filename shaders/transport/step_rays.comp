@@ -22,6 +22,16 @@ layout(std430, binding = END_COUNTS_BINDING) writeonly buffer EndCounts { uint e
 layout(std430, binding = LIVE_RAYS_BINDING) readonly buffer LiveRays { int live_rays[]; };   // rows: numbers, hits first; by number: place, pixel; path, object, triangle, weights of the hit
 layout(std430, binding = RAY_LIGHT_BINDING) writeonly buffer RayLight { vec4 ray_light[]; };  // and fraction that is lost
 
+#if ONE_OBJECT && !MISSES
+layout(std430, binding = HORIZONS_BINDING) readonly buffer Horizons { float horizons[]; };  // see horizons.comp
+uniform int has_horizons;  // 1: they are found, and those of the mesh are those of the body
+
+// Whether a ray that leaves a triangle hits nothing for certain.
+bool escapes(Ray ray, float horizon) {
+    return ray.interior.x == 0u && dot(ray.direction, face_outwards) > horizon;
+}
+#endif
+
 uniform int first_number, live_count;
 uniform int live_rows;     // their length
 
@@ -48,6 +58,18 @@ void main() {
     }
     Ray weaker;
     int goes_on = follow_to_end(ray, weaker, hit, primary, channel, true), stored = 0;
+#if ONE_OBJECT
+    float horizon = has_horizons == 1 ? horizons[hit.triangle] : 1.0;
+    if (goes_on == BOTH && escapes(weaker, horizon)) {
+        terminate(weaker);
+        goes_on = ONE;
+    }
+    if (goes_on != NONE && escapes(ray, horizon)) {
+        terminate(ray);
+        ray = weaker;
+        --goes_on;
+    }
+#endif
     while (ends > 0) {
         vec3 throughput;
         EscapedRay end = take_end(throughput);

@@ -20,7 +20,8 @@ from translucent.assets import mesh_path
 from translucent.geometry.ray_caster import embree_refusal
 from translucent.geometry.solids import Box, Sphere, Torus
 from translucent.gpu import embree_hits as module
-from translucent.gpu.embree_hits import EmbreeHits
+from translucent.gpu.embree_hits import EmbreeHits, mesh_scene
+from translucent.gpu.hierarchies import packed_mesh
 from translucent.gpu.passes import ray_generations, traced_interfaces
 from translucent.planning.render_plan import Capabilities
 
@@ -130,6 +131,55 @@ def test_portions_are_divided_where_rays_have_no_room(renderer: tl.Renderer, mon
     monkeypatch.setattr(ray_generations, "LEAST_PLACES", 1)
     np.testing.assert_array_equal(rendered(renderer, scene, "embree").radiance, whole.radiance)
     assert divided
+
+
+def horizons_of(renderer: tl.Renderer, scene: tl.Scene) -> Any:
+    gpu = renderer.gpu
+    buffer = gpu._resources.hierarchies.of(scene).horizons
+    with gpu.context.current():
+        return None if buffer is None else np.frombuffer(buffer.read(), np.float32)
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+def test_rays_above_the_horizon_of_a_triangle_hit_nothing(
+    renderer: tl.Renderer, inverted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a ring, whose triangles near the hole look at others; pictures stay the same but for rounding."""
+    mesh = tl.Mesh(RING.vertices, RING.faces[:, ::-1] if inverted else RING.faces)
+    uneven = np.diag([1.0, 1.2, 1.0, 1.0])
+    scenes = [seen(tl.Object(mesh, GLASS, matrix)) for matrix in (at(0.1, 0, 0, by=0.8), uneven)]
+    rays, made = list[int](), EmbreeHits.nearest
+    monkeypatch.setattr(EmbreeHits, "nearest", lambda hits, *ray: rays.append(len(ray[0])) or made(hits, *ray))
+
+    def drawn(scene: tl.Scene) -> tuple[Any, int]:
+        rays.clear()
+        return rendered(renderer, scene, "embree").radiance, sum(rays)
+
+    before = [drawn(scene) for scene in scenes]
+    assert horizons_of(renderer, scenes[1]) is None
+    monkeypatch.setattr(ray_generations, "RAYS_BEFORE_HORIZONS", 0)
+    monkeypatch.setattr(ray_generations, "FOR_EACH_TRIANGLE", 0)
+    after = [drawn(scene) for scene in scenes]
+    for (one, _), (other, _) in zip(before, after, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-6)
+    assert after[0][1] < 0.85 * before[0][1]
+    assert after[1][1] == before[1][1]  # angles in the mesh are not those in the world
+    sines = horizons_of(renderer, scenes[0])
+    packed = packed_mesh(mesh)
+    corners = packed.triangles.view(np.float32).reshape(-1, 3, 4)[..., :3].astype(float)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) * (-1.0 if inverted else 1.0)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    rng = np.random.default_rng(3)
+    number = np.repeat(np.arange(len(sines)), 40)
+    weights = rng.dirichlet((0.3, 0.3, 0.3), len(number))
+    directions = rng.normal(size=(len(number), 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    directions *= np.sign(np.einsum("ij,ij->i", directions, normals[number]))[:, None]
+    above = np.einsum("ij,ij->i", directions, normals[number]) > sines[number]
+    origins = np.einsum("ij,ijk->ik", weights, corners[number]) + 3e-6 * normals[number]
+    hit = mesh_scene(mesh).run(origins.astype(np.float32), directions.astype(np.float32)) >= 0
+    assert not (hit & above).any()
+    assert above[~hit].mean() > 0.6
 
 
 def test_one_pixel_has_room_for_all_its_rays(renderer: tl.Renderer) -> None:

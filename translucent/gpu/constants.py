@@ -83,6 +83,9 @@ STORAGE_BINDINGS = {
     "end_counts": 9,
     "ended_rays": 0,
     "first_pixels": 8,
+    "horizons": 10,
+    "mesh_nodes": 0,
+    "mesh_triangles": 1,
 }
 
 #: Parts along a side of a pixel that is drawn enlarged, and such pixels along a side of what is drawn.

@@ -208,6 +208,10 @@ class SceneHierarchies:
         Texel behind the triangles at which the table of the textures of surfaces begins, if the scene has any.
     contacts : (2, 3) float64
         Bounds of all places in which surfaces of two objects that have been placed may lie together.
+    traced_rays : int
+        Rays that have been traced by generations.
+    horizons : moderngl.Buffer, optional
+        Horizon of each triangle of a single mesh, once it is known; see ``shaders/transport/horizons.comp``.
     """
 
     def __init__(
@@ -246,6 +250,8 @@ class SceneHierarchies:
         self.object_nodes = 0
         self.contacts: Array = np.zeros((2, 3))
         self.first_triangles = np.zeros(0, np.int32)
+        self.traced_rays = 0
+        self.horizons: moderngl.Buffer | None = None
         self._placed: tuple[Hashable, tuple[Fields, ...], tuple[float, float, float, float]] | None = None
 
     def place(self, scene: Scene, center: Array) -> tuple[tuple[Fields, ...], tuple[float, float, float, float]]:
@@ -309,6 +315,8 @@ class SceneHierarchies:
         """Free the textures."""
         self.nodes.release()
         self.triangles.release()
+        if self.horizons is not None:
+            self.horizons.release()
 
 
 class HierarchyCache:

@@ -3,6 +3,9 @@
 A generation has a list of live rays, in the order of their pixels. Each leaves up to two branches at places of its own,
 twice its number and one more, and the CPU lists the branches that exist. So pictures are the same each time: no result
 depends on the order in which threads run. A frame is traced in portions, which bound the memory.
+
+Once a renderer has traced many rays of a single body, rays that leave it steeply enough to hit nothing end at once;
+light is then added in another order, which rounds it differently.
 """
 
 from __future__ import annotations
@@ -15,8 +18,10 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from translucent.geometry.mesh import Mesh
 from translucent.gpu.constants import STORAGE_BINDINGS
 from translucent.gpu.embree_hits import EmbreeHits, Floats, RayHits
+from translucent.gpu.hierarchies import SceneHierarchies, packed_mesh
 from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.variants import ComputeVariants
 from translucent.gpu.placement import Part
@@ -33,6 +38,10 @@ PLACES, MORE_PLACES = 6, 8
 #: Places at least, to each channel: the tree of one pixel has at most 1024 rays; see
 #: ``shaders/transport/ray_step.glsl``.
 LEAST_PLACES = 2 * 1024
+
+#: Rays that are traced before the horizons of the triangles of a body are found, and how many more for each triangle:
+#: by then, rays that hit nothing have cost as much as the shader that finds horizons takes, with its compilation.
+RAYS_BEFORE_HORIZONS, FOR_EACH_TRIANGLE = 1_600_000, 160
 
 #: Rows of the lists of live rays and what they hit; bytes of these, of light, and of the lists of pixels and of ends,
 #: for each ray.
@@ -70,6 +79,7 @@ class RayGenerations:
         self._step = ComputeVariants(gl, "transport/step_rays.comp", **units)
         self._shade = ComputeVariants(gl, "transport/shade_ends.comp", **units)
         self._sum = ComputeVariants(gl, "transport/sum_ray_light.comp")
+        self._horizons = ComputeVariants(gl, "transport/horizons.comp")
         units |= {name: unit for unit, name in enumerate(straight, len(samplers))}
         images = {name: unit for unit, name in enumerate(_SUMMED)}
         self._add = ComputeVariants(gl, "transport/add_samples.comp", **units, **images)
@@ -106,6 +116,7 @@ class RayGenerations:
         )
         hierarchies = job.resources.hierarchies.of(job.scene, textured=job.features.textured)
         room = _Room(job, pixels, switches, hierarchies.first_triangles)
+        values = {**values, "has_horizons": int(self._has_horizons(job, hierarchies))}
         sizes = {"ray_vectors": room.words // 4, "end_words": room.end_words, "columns": width}
         for program in filter(None, programs):
             set_used(program, {**values, **sizes})
@@ -120,6 +131,40 @@ class RayGenerations:
             if parts > 1:
                 assert len(portion) > 1
                 waiting += _parts(portion, parts)[::-1]
+        hierarchies.traced_rays += room.traced_rays
+
+    def _has_horizons(self, job: FrameJob, hierarchies: SceneHierarchies) -> bool:
+        """Bind the horizons of the triangles of a single body; False if these are unknown, or not worth their time."""
+        triangles, linear = hierarchies.surface_table // 3, job.scene.objects[0].matrix[:3, :3]
+        squared = linear.T @ linear
+        keeps_angles = np.allclose(squared, squared[0, 0] * np.eye(3), rtol=0.0, atol=1e-5 * squared[0, 0])
+        if hierarchies.traced_rays < RAYS_BEFORE_HORIZONS + FOR_EACH_TRIANGLE * triangles:
+            return False
+        if len(job.scene.objects) > 1 or not keeps_angles:
+            return False
+        if hierarchies.horizons is None:
+            hierarchies.horizons = self._found_horizons(job.gl, job.scene.objects[0].mesh)
+        hierarchies.horizons.bind_to_storage_buffer(STORAGE_BINDINGS["horizons"])
+        return True
+
+    def _found_horizons(self, gl: moderngl.Context, mesh: Mesh) -> moderngl.Buffer:
+        """Horizons of the triangles of a mesh, by its hierarchy; see ``shaders/transport/horizons.comp``."""
+        program, packed = self._horizons.program(), packed_mesh(mesh)
+        count, nodes = len(packed.faces), packed.nodes[0]
+        sizes = {"node_count": len(nodes), "triangle_count": count}
+        set_used(program, {**sizes, "outwards": -1.0 if mesh.diagnosis.inverted else 1.0})
+        found = gl.buffer(reserve=4 * count)
+        buffers = {
+            "mesh_nodes": gl.buffer(nodes),
+            "mesh_triangles": gl.buffer(packed.triangles),
+            "horizons": found,
+        }
+        for name, buffer in buffers.items():
+            buffer.bind_to_storage_buffer(STORAGE_BINDINGS[name])
+        self._horizons.run(program, count)
+        buffers["mesh_nodes"].release()
+        buffers["mesh_triangles"].release()
+        return found
 
     def add(
         self,
@@ -154,6 +199,7 @@ class RayGenerations:
         while count := len(live.places):
             if count > room.live:
                 return 2
+            room.traced_rays += count
             found, pixels = room.put(live, hits.nearest(live.origins, live.directions))
             set_used(step, {"live_count": found, "live_rows": count})
             set_used(leave, {"first_number": found, "live_count": count, "live_rows": count})
@@ -231,6 +277,7 @@ class _Room:
         self._pixels.write(pixels)
         self._numbers = np.zeros(0, np.int32), np.zeros(0, np.int32)
         self._first_triangles = first_triangles
+        self.traced_rays = 0
 
     def portions(self, count: int) -> list[range]:
         """Numbers of so many pixels in portions, each with rays that there is room for at first.
