@@ -227,8 +227,8 @@ def rays_of_photons(photons: EnteringPhotons, grid: BodyGrid, pose: Pose) -> Ent
     )
     flux = photons.power / grid.areas[sample, None]
     rays = EnteringRays(sample, pose.inwards(photons.directions), flux, np.zeros_like(flux))
-    found = two_of_many(rays, grid.face_normals, grid.mean_of_neighbors)
-    # Means over neighbors keep even light even, and its power nearly.
+    found = two_of_many(rays, grid.face_normals, grid.mean_around)
+    # Means keep even light even, and its power nearly.
     power = grid.areas[found.samples] @ found.entering
     scale = photons.power.sum(axis=0) / np.where(power > 0.0, power, 1.0)
     return replace(found, entering=scale * found.entering)

@@ -68,6 +68,9 @@ SMOOTH, STIFF = 0.5, 1e-2
 #: Largest change of a surface's area over the depth of reading, as half of its logarithm: mean curvature times depth.
 MOST_CURVED = 0.25
 
+#: Number of times that means over neighbors are squared where random rays are few.
+MEANS = 3
+
 #: Most steps in which values are smoothed along the surface.
 SMOOTHINGS = 8
 
@@ -333,10 +336,13 @@ class BodyGrid:
         starts = np.arange(len(near) + 1) * near.shape[1]
         return sparse.csr_array((weight.ravel(), near.ravel(), starts), (len(near), len(near))), variance
 
-    @property
-    def mean_of_neighbors(self) -> sparse.csr_array:
-        """(s, s): mean over each sample and its neighbors on the same smooth surface."""
-        return self._mean_of_neighbors[0]
+    @cached_property
+    def mean_around(self) -> sparse.csr_array:
+        """(s, s): mean over some tens of samples around each, on the same smooth surface, where rays are few."""
+        mean = self._mean_of_neighbors[0]
+        for _ in range(MEANS):
+            mean = sparse.csr_array(mean @ mean)
+        return mean
 
     def smoothed(self, values: Array, variance: float) -> Array:
         """(s,): values (s,) at the samples, smoothed along the surface with a variance in m^2 along each axis."""

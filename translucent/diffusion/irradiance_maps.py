@@ -241,7 +241,7 @@ class _Gathering:
 
 
 #: Paths from all samples of a body together, and from each at least and at most.
-PATHS, FEWEST, MOST = 1 << 17, 8, 48
+PATHS, FEWEST, MOST = 1 << 18, 8, 48
 
 #: Bounds of the correction by which the paths of a sample let in the known fraction of uniform light.
 _CORRECTION = (0.5, 2.0)
@@ -256,7 +256,7 @@ class PathExchange:
     itself, others : three (s, s) csr_array, three (s, o) csr_array
         By color channel: for the samples of the body, and for flux over n^2 at those of all others, one after another.
     mean : (s, s) csr_array
-        Over neighbors: paths are few.
+        Over samples around each: paths are few.
     """
 
     itself: Sequence[sparse.csr_array]
@@ -396,7 +396,7 @@ class EnclosedPaths:
             shape = count, columns
             return [sparse.csr_array((values[of, channel], (owner[of], column[of])), shape) for channel in range(3)]
 
-        return PathExchange(matrices(mine, count), matrices(~mine, sum(sizes)), self._grid.mean_of_neighbors)
+        return PathExchange(matrices(mine, count), matrices(~mine, sum(sizes)), self._grid.mean_around)
 
     def light(self, scene: Scene) -> tuple[Array, EnteringRays]:
         """Uniform flux (s, 3) that enters, and rays for the rest, from environment and opaque objects of a scene.
@@ -429,7 +429,7 @@ class EnclosedPaths:
         used = np.flatnonzero((self._entering > 0.0) & rest.any(axis=1))
         entering, mirrored = (part[used, None] * rest[used] for part in (self._entering, self._mirrored))
         rays = EnteringRays(used // self._rays, self._inside[used], entering, mirrored)
-        mean = self._grid.mean_of_neighbors
+        mean = self._grid.mean_around
         return mean @ uniform, two_of_many(rays, self._grid.face_normals, mean)
 
 

@@ -268,6 +268,13 @@ def reflected_effects(scene: Scene, exchanging: Sequence[int]) -> list[Note]:
             f"{object_names(lamps)}: the light that these surfaces emit does not reach {object_names(unlit)}; "
             "--method path-traced includes this light"
         )
+    glowing = [body for body in scene.bodies if body.medium is not None and body.medium.emits]
+    silent = [body for body in glowing if treatment_of(body) is not Treatment.DIFFUSION]
+    if silent and scene.opaque:
+        texts.append(
+            f"{object_names(silent)}: the light that these media emit does not reach {object_names(scene.opaque)}: "
+            "black there if nothing else shines; --method path-traced includes this light"
+        )
     return [Note(NoteKind.REFLECTED_LIGHT, text) for text in texts]
 
 
