@@ -110,7 +110,7 @@ def test_diffusion_is_nearer_than_layers_and_what_engines_do(
     names = ("diffusion-resolution-16", "diffusion-resolution-32", "ScatteringLayer", "layer-without-inner-mirrors")
     solved: list[tl.Diffusion] = []
     solve = FieldCache._body
-    monkeypatch.setattr(FieldCache, "_body", lambda *given: (solved.append(given[-1]), solve(*given))[1])
+    monkeypatch.setattr(FieldCache, "_body", lambda *given: (solved.append(given[4]), solve(*given))[1])
     made = measured(bench, named("jade ring"), *names)
     assert solved == [tl.Diffusion(16), tl.Diffusion(32)], "once each, though drawn in two sizes"
     assert made.truth_noise is not None
