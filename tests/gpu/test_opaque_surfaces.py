@@ -135,7 +135,7 @@ def test_balls_mirror_as_much_light_at_grazing_angles(renderer: tl.Renderer) -> 
 
 
 def test_flat_mirrors_show_a_point_light_whole(renderer: tl.Renderer) -> None:
-    """Its light in the picture is I / (t + r)^2, at t + r from the eye by way of the mirror; with parallel rays I.
+    """At a distance r behind a mirror that is t away, it is as bright as at t + r; in parallel rays as from r everywhere.
 
     Measured .96 to .99; .02 to 1.1 with a filter that leaves out how view rays and directions to the light turn.
     """
