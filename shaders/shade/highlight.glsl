@@ -4,8 +4,6 @@
 #include "lib/light.glsl"
 #include "shade/packed_variance.glsl"
 
-const float MOST_NORMAL_VARIANCE = 0.18;
-
 float determinant_of(vec3 symmetric) { return max(symmetric.x * symmetric.z - symmetric.y * symmetric.y, 1e-20); }
 
 // Squared alpha of microfacets around a normal, projected along the view ray. normal: projected.
@@ -39,24 +37,10 @@ float distribution_in_sample(vec3 half_vector, vec3 normal, vec3 ray, float cos_
     return cos_view * inversesqrt(determinant_of(width)) / (PI * off * off * visible_part(axes * half_vector, variance));
 }
 
-// Variance of the normals within a sample, less the half vectors of a light: as far as microfacets of alpha, and the light's disc, are
-// no filter themselves. variance: for a far light, and the square of the sample's width; normal: projected. Half vectors turn as in
-// normal_variance.glsl, by width / distance. Both turns are taken to add up: (a + b)^2 <= (1 + b / a) a^2 + (1 + a / b) b^2.
-vec3 variance_for(LightSample arriving, vec4 variance, vec2 normal, float cos_view, float alpha) {
-    float squared = cos_view * cos_view, part = 1.0 + squared * squared, spread = sqrt(max(variance.x + variance.z, 1e-20));
-    float turned = 0.5 * sqrt(variance.w * part) / (arriving.distance_m * cos_view);
-    vec3 across = vec3(1.0, 0.0, 1.0) - (1.0 + squared) * vec3(normal.x * normal, normal.y * normal.y);
-    vec3 sum = (1.0 + turned / spread) * variance.xyz + turned * (spread + turned) / part * across;
-    float disc = arriving.disc.w > 8.0 * alpha ? 0.5 * arriving.disc.w : 0.0, trace = sum.x + sum.z;
-    return sum * (clamp(trace - squared * (alpha * alpha + disc * disc), 0.0, MOST_NORMAL_VARIANCE) / max(trace, 1e-30));
-}
-
 // Microfacets that mirror a light towards the eye, without their reflectance, times the cosine of its light.
-float highlight_value(LightSample arriving, vec3 normal, vec3 ray, float cos_view, float alpha, vec4 stored, out float cos_facet) {
+float highlight_value(LightSample arriving, vec3 normal, vec3 ray, float cos_view, float alpha, vec3 variance, out float cos_facet) {
     float least = max(alpha, SMALLEST_HIGHLIGHT), cos_light = dot(normal, arriving.towards);
-    vec2 projected = projection(ray) * normal;
-    vec3 variance = variance_for(arriving, stored, projected, cos_view, least);
-    float width = sqrt(sqrt(determinant_of(projected_alpha(least * least, projected, variance))) / cos_view);
+    float width = sqrt(sqrt(determinant_of(projected_alpha(least * least, projection(ray) * normal, variance))) / cos_view);
     vec4 from = highlight_from(arriving.towards, arriving.disc, reflected_direction(ray, normal), width, cos_view);
     vec3 half_vector = normalize(from.xyz - ray);
     cos_facet = max(dot(half_vector, from.xyz), 0.0);

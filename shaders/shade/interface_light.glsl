@@ -4,7 +4,6 @@
 
 #include "lib/two_stream.glsl"
 #include "shade/highlight.glsl"
-#include "shade/in_picture.glsl"
 #include "shade/interface_bsdf.glsl"
 #include "shade/lights.glsl"
 #include "shade/shadows.glsl"
@@ -61,7 +60,7 @@ vec3 irradiance_reaching(int light, LightSample arriving, vec3 point, vec3 norma
 }
 
 // Microfacets that reflect the lights, as far as these reach them.
-vec3 highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float alpha, vec4 variance) {
+vec3 highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float alpha, vec3 variance) {
     vec3 sum = vec3(0.0);
     float cos_view = max(-dot(normal, ray), 1e-3);
     for (int light = 0; light < light_count; ++light) {
@@ -77,8 +76,7 @@ vec3 highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float alpha,
 
 // The same with its clear coat. stored: variance of the normals within the pixel.
 vec3 coated_highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float stored) {
-    float width = pixel_metres(metres_ahead_of(point) + surface_ahead.z);
-    vec4 variance = vec4(unpacked_variance(stored), sample_alpha() * width * width);
+    vec3 variance = unpacked_variance(stored);
     vec3 sum = highlights(point, normal, ray, surface, surface.roughness * surface.roughness, variance);
 #if CLEAR_COAT
     if (surface.clearcoat.x == 0.0) { return sum; }

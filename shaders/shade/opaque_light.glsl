@@ -20,7 +20,7 @@ struct OpaqueSurface {
     float passed_share; // and without: what the base does not reflect
     vec3 emitted;
     vec3 normal;        // unit, towards the side that the mesh calls outside
-    vec4 variance;      // of normals within a sample, see normal_variance.glsl
+    vec3 variance;      // of normals within a sample, see normal_variance.glsl
     float opacity;      // of texture and vertices
     float unoccluded;   // fraction of the light of the environment that reaches it
     bool is_hole;
@@ -40,7 +40,7 @@ struct OpaqueBsdf {
     vec3 passed;         // fraction of light on the other side
     float alpha;         // of its microfacets,
     float coat_alpha;    // and of those of the clear coat
-    vec4 variance;       // of normals within a sample, see normal_variance.glsl
+    vec3 variance;       // of normals within a sample, see normal_variance.glsl
     float coat_weight;
 };
 

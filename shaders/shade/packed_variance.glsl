@@ -1,15 +1,4 @@
-// What highlights are filtered by: the area of a sample, and a symmetric matrix of two rows, as a picture stores it in one number. See
-// normal_variance.glsl.
-
-// Squared alpha of the filter of one sample in the middle of each pixel, which finds the light of a smaller light with a standard
-// error of 4 %. So do several at low-discrepancy points, at most 5 %, if their filters have four times their area.
-const float PIXEL_ALPHA = 0.6366198;  // 2 / pi
-const float OVERLAP = 4.0;
-
-uniform float sample_area;  // in pixels
-
-// Squared alpha of a filter over what changes by one within a pixel.
-float sample_alpha() { return PIXEL_ALPHA * min(OVERLAP * sample_area, 1.0); }
+// A symmetric matrix of two rows, as a picture stores it in one number: see normal_variance.glsl.
 
 const float LEAST_PACKED = 24.0;  // octaves below 1
 

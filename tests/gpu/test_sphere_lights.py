@@ -177,7 +177,7 @@ def test_random_paths_in_smoke(renderer: tl.Renderer, follows: None) -> None:
 
 @pytest.mark.parametrize("roughness", [0.2, 0.4])
 def test_highlights_in_rough_interfaces(renderer: tl.Renderer, roughness: float) -> None:
-    """Against the reference, which samples the sphere. Measured .018 and .003 RMS, in the mean 1e-3 and 1e-5."""
+    """Against the reference, which samples the sphere. Measured .026, .005 and .003 RMS, in the mean 3e-4."""
     scene = wall(tl.Surface(roughness=roughness))
     truth = references.render(scene, (16, 12), refraction=True, paths=2).radiance
     with tl.Renderer(backend="cpu") as cpu:
@@ -185,7 +185,7 @@ def test_highlights_in_rough_interfaces(renderer: tl.Renderer, roughness: float)
             found = one.render(scene, (16, 12), interfaces=tl.TracedInterfaces()).radiance
             off = (found - truth) / truth.max()
             tell(roughness, off)
-            assert abs(off.mean()) <= 1.5e-3
+            assert abs(off.mean()) <= 1e-3
             assert np.sqrt((off**2).mean()) <= (0.04 if roughness == 0.2 else 0.01)
     if roughness == 0.4 and renderer.gpu.capabilities.shader_storage:
         found = renderer.render(scene, (16, 12), tl.PathTraced(256)).radiance

@@ -383,11 +383,6 @@ class FrameJob(CameraView):
         table = self._packed[1]
         return self.gl.texture(table.shape[1::-1], 4, table, dtype="f4")
 
-    @property
-    def sample_area(self) -> float:
-        """Area that a sample is the light of, in pixels."""
-        return 1.0 if self.enlarged else 1.0 / self.samples
-
     def place(self, shift: tuple[float, float], *, with_depth: bool = False) -> None:
         """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""
         scene = self.scene

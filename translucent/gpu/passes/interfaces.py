@@ -74,7 +74,7 @@ class InterfacesPass:
                 job.resources.textures.bind(surface, program, len(_DRAWN_SAMPLERS))
                 set_uniform(program, "surface_color", (*np.asarray(surface.color), surface.transmission))
                 set_uniform(program, "surface_roughness", surface.roughness)
-                set_used(program, {"sample_area": job.sample_area})
+                set_used(program, {"sample_area": 1.0 if job.enlarged else 1.0 / job.samples})
                 held = program, surface
             if holes:
                 set_uniform(program, "hole_below", surface.alpha_cutoff)
@@ -198,7 +198,6 @@ class SurfacesPass:
             **coat_switches(job.scene.bodies),
             DIFFUSED=job.diffused_light is not None,
         )
-        set_used(program, {"sample_area": job.sample_area})
         self._variants.draw_covered(job, program, framebuffer, top_first=True)
         gl.enable_only(blending)
         table.release()

@@ -117,7 +117,7 @@ class OpaquePass:
                 program = self._surfaced.program(SURFACE=1, **switches, **looks)
                 self._surfaced.bind(**job.resources.light_textures(environment))
                 set_surface(job, program, surface, surface.alpha_cutoff)
-                set_used(program, {"texture_bias": -0.5 * math.log2(job.samples), "sample_area": job.sample_area})
+                set_used(program, {"texture_bias": -0.5 * math.log2(job.samples), "sample_area": 1.0 / job.samples})
             if ground is not None and mapped:
                 ground.texture.use(self._plain.units["ground_shadows"])
                 set_used(program, {"ground_rows": ground.rows, "mapped_ground": ground.plane})
@@ -356,7 +356,7 @@ class LayersPass:
             **coat_switches([body]),
         )
         set_surface(job, program, surface, surface.alpha_cutoff or (LEAST_COVER if body.covers else 0.0))
-        set_used(program, {"sample_area": job.sample_area})
+        set_used(program, {"sample_area": 1.0 / job.samples})
         if body.covers:
             set_uniform(program, "layer_opacity", surface.opacity)
         # The far side first, as in viewers of glTF; a sheet that emits does so on both sides.
