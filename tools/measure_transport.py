@@ -3,7 +3,8 @@
 FOLDER holds `scenes.py`, with ``SCENES`` (all names) and ``make(name)`` (a scene, and the side of its picture in
 pixels), and for each name an .npz file of two independent pictures ``a`` and ``b`` (h, w, 3), whose difference is
 noise, and ``mask`` (h, w): the pixels that count. Further masks may be there, such as ``ground``. Scenes without a
-file are left out.
+file are left out; ``tools/transport_truth.py`` makes files. ``CHOICES`` may hold arguments of `Renderer.render` for
+some names.
 
 Printed are shares of the mean of the truth: the RMS error (as the mean of (x - a)(x - b), which noise of the truth
 does not change), the same of means of 4 x 4 pixels, the bias of R, G and B, and the noise of the truth; and seconds
@@ -155,11 +156,12 @@ def measure(renderer: tl.Renderer, folder: Path, chosen: argparse.Namespace) -> 
             print(f"{name}: no truth in {folder}", flush=True)
             continue
         scene, side = scenes.make(name)
-        choices: list[dict[str, Any]] = [{"samples": chosen.samples}]
+        own = getattr(scenes, "CHOICES", {}).get(name, {})
+        choices: list[dict[str, Any]] = [{"samples": chosen.samples, **own}]
         if chosen.paths:
             choices = [{"samples": 2, "method": tl.PathTraced(paths=chosen.paths)}]
         elif chosen.every:
-            choices.append({"samples": chosen.samples, "adaptive": False})
+            choices.append({"samples": chosen.samples, "adaptive": False, **own})
         with np.load(folder / f"{name}.npz") as stored:
             pictures = {key: stored[key] for key in stored.files}
         a, b = pictures.pop("a").astype(np.float64), pictures.pop("b").astype(np.float64)

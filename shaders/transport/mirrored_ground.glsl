@@ -5,6 +5,7 @@
 uniform int mirrored;        // 1: these rays, and not those of the first interfaces
 uniform vec4 mirror_plane;   // of the ground: unit normal upwards, and metres along it from the center of the media
 uniform vec2 mirror_surface; // roughness and ior of its coat
+uniform vec4 mirror_metal;   // reflectance of its metal, and the fraction that is metal
 
 // The ray of a pixel in which the ground is visible, and the fraction of the light that its coat reflects; false elsewhere.
 bool begin_in_mirror(Pixel pixel, out Ray ray, out vec3 reflectance) {
@@ -20,7 +21,8 @@ bool begin_in_mirror(Pixel pixel, out Ray ray, out vec3 reflectance) {
     vec3 reflected = reflected_direction(direction, facet);
     if (dot(reflected, normal) <= 0.0) { return false; }
     float step = (mirror_surface.y - 1.0) / (mirror_surface.y + 1.0);
-    reflectance = layer_of(vec3(step * step), reflectance_entry(cosine, mirror_surface.x)).albedo;
+    vec2 entry = reflectance_entry(cosine, mirror_surface.x);
+    reflectance = mix(layer_of(vec3(step * step), entry).albedo, layer_of(mirror_metal.rgb, entry).albedo, mirror_metal.a);
     ray = Ray(point + MIRROR_MARGIN * surface_reach * normal, 0.0, reflected, blurred_fraction * alpha * alpha, reflectance,
         packed_state(1, mirror_metal.a > 0.0 ? FORKS : 0, true, MOST_INTERACTIONS), 1u, uvec4(0u), -normal, no_footprint());
     return true;

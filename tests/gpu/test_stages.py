@@ -95,15 +95,19 @@ def test_an_eye_below_sees_the_model_and_no_ground(renderer: tl.Renderer) -> Non
     np.testing.assert_allclose(frame.radiance, renderer.render(alone, SIZE).radiance, atol=1e-5)
 
 
-@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize(("unit", "metal"), [(1e-6, False), (1.0, False), (1e6, False), (1.0, True)])
 def test_the_ground_mirrors_what_a_mirrored_eye_sees(
-    renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch, unit: float
+    renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch, unit: float, metal: bool
 ) -> None:
-    """With a polished coat, bodies change Fresnel's share of what an eye sees from as far below the ground."""
+    """With a polished coat, bodies change Fresnel's share of what an eye sees from as far below the ground.
+
+    So they do on polished metal, and on grounds that are no shadow catchers.
+    """
     # Black and polished: what is seen of the ball is mirrored once, and above the horizon without any tracing.
     ball = tl.Object(tl.Mesh(unit * BALL.vertices, BALL.faces), tl.Medium(absorption=1e4 / unit, ior=1.5))
-    coat = tl.Surface(color=(0.2, 0.2, 0.2), roughness=0.0, double_sided=False)
-    ground = dataclasses.replace(catcher(unit), surface=coat)
+    color = (0.9, 0.5, 0.3) if metal else (0.2, 0.2, 0.2)
+    coat = tl.Surface(color=color, roughness=0.0, double_sided=False, metallic=float(metal))
+    ground = dataclasses.replace(catcher(unit), surface=coat, shadow_catcher=not metal)
     lift = np.eye(4)
     lift[1, 3] = 1.2 * unit
     eye, target = np.array([0.0, 3.0, 7.0]) * unit, np.array([0.0, 0.0, 1.0]) * unit
@@ -121,8 +125,10 @@ def test_the_ground_mirrors_what_a_mirrored_eye_sees(
     seen = renderer.render(below, SIZE)
     _, rays = camera.rays(SIZE)
     cosine = np.abs(rays[..., 1])
-    fresnel = 0.04 + 0.96 * (1.0 - cosine) ** 5  # Schlick's curve, as coats of opaque objects have it
-    image = fresnel[..., None] * (seen.radiance[::-1] - sky.lighting(rays * down))
+    facing = np.array(color if metal else (0.04,) * 3)
+    # Schlick's curve, as coats of opaque objects have it.
+    fresnel = facing + (1.0 - facing) * (1.0 - cosine[..., None]) ** 5
+    image = fresnel * (seen.radiance[::-1] - sky.lighting(rays * down))
     expected = np.where(seen.coverage[::-1, :, None], image, 0.0)[~with_image.coverage]
     assert (np.abs(expected).max(axis=1) > 0.02).sum() > 100
     off = np.abs(changed - expected).max(axis=1)

@@ -122,6 +122,30 @@ def test_the_light_of_a_ball_on_a_ground() -> None:
     assert shadowed.values.max() > 0.3 > 0.03 > through.values.max()
 
 
+def test_the_light_of_a_glowing_ball_on_a_ground() -> None:
+    """A ball that emits q V W/sr, and neither absorbs nor bends light, is like a point (Newton's shell theorem)."""
+    ball = tl.Object(Sphere(radius=0.5).tessellate(64), tl.Medium(emission=(1, 2, 3)))
+    glass = tl.Object(Sphere(radius=0.7).tessellate(64), tl.Medium(ior=1.4), priority=-1)
+    board = tl.Object(Box((0.2, -0.9, -4), (4, -0.85, 4)).tessellate(), None)
+    hidden, bare = (plan(tl.Scene(objects, CAMERA)) for objects in ([ball, ground(), board], [ball, ground()]))
+    assert bare.glowing == (0,)
+    alone, beside = (FieldCache().of(one).ground for one in (bare, hidden))
+    assert alone is not None
+    assert beside is not None
+    x = np.linspace(-2, 2, 9)
+    at, up = np.stack([x, 0 * x - 1.02, 0 * x], axis=1), np.tile((0.0, 1.0, 0.0), (9, 1))
+    point = ball.mesh.volume * 1.02 / (x**2 + 1.02**2)[:, None] ** 1.5 * (1, 2, 3)
+    np.testing.assert_allclose(alone.irradiance(at, up), point, rtol=0.03)
+    # Below the board it is dark; and a ball in glass, which traps none of this light, sends as much.
+    np.testing.assert_allclose(beside.irradiance(at, up)[-3:], 0.0, atol=1e-6)
+    np.testing.assert_allclose(beside.irradiance(at, up)[:2], point[:2], rtol=0.03)
+    inside = plan(tl.Scene([ball, ground(), glass], CAMERA, overlap="priority"))
+    assert inside.glowing == (0, 2)
+    around = FieldCache().of(inside).ground
+    assert around is not None
+    assert around.irradiance(at, up).mean() == pytest.approx(point.mean(), rel=0.05)
+
+
 def test_bodies_on_a_ground_hide_each_other() -> None:
     """A surface that a ball hides from every point of the ground exchanges no light with the ground."""
     outer, inner = Sphere(radius=0.5).tessellate(24), Sphere(radius=0.3).tessellate(24)

@@ -21,7 +21,7 @@ from translucent.diffusion.entering import (
 from translucent.diffusion.environment_ahead import behind_body
 from translucent.diffusion.exchange import BodyHits, GroundMap, GroundPoints, OpaqueSurfaces
 from translucent.diffusion.field import DiffusingBody, DiffusionField, EnclosedBody, lit_by_each_other
-from translucent.diffusion.irradiance_maps import EnclosedPaths, IrradianceMap, irradiance_maps
+from translucent.diffusion.irradiance_maps import EnclosedPaths, IrradianceMap, emitted_irradiance, irradiance_maps
 from translucent.diffusion.keys import (
     bending_key,
     coefficients_of,
@@ -82,7 +82,7 @@ class Fields:
 
     def __bool__(self) -> bool:
         """True if there is any."""
-        return bool(self.surfaces or self.volumes or self.maps)
+        return bool(self.surfaces or self.volumes or self.maps or self.ground)
 
     def on_opaque(self, points: Array, normals: Array, sky: Array) -> Array:
         """(k, 3): irradiance at points (k, 3) of opaque objects by all but the straight light of lights.
@@ -153,7 +153,7 @@ class FieldCache:
                 for i, medium in media.items()
                 if i not in bodies
             }
-            ground = ground_map(scene, {i: own.lit for i, own in bodies.items()}, surfaces)
+            ground = ground_map(scene, {i: own.lit for i, own in bodies.items()}, surfaces, plan.glowing)
             return Fields(surfaces, volumes, ground)
 
         with self._lock, one_blas_thread():
@@ -287,17 +287,20 @@ class _Bent:
     stops: dict[int, RayCaster | None]
 
 
-def ground_map(scene: Scene, lit: Mapping[int, LitBody], surfaces: Mapping[int, DiffusionField]) -> GroundMap | None:
+def ground_map(
+    scene: Scene, lit: Mapping[int, LitBody], surfaces: Mapping[int, DiffusionField], glowing: Sequence[int] = ()
+) -> GroundMap | None:
     """Light that bodies, by their numbers, send to the ground below them; None without one.
 
-    Unless maps of the environment's shadows do it, the environment's light that the bodies keep from it is subtracted.
-    Bodies and opaque objects hide each other.
+    The media of `glowing` bodies emit it, in others it has diffused. Unless maps of the environment's shadows do it,
+    the environment's light that these keep from it is subtracted. They and opaque objects hide each other.
     """
-    if not lit or (ground := ground_below(scene, sorted(lit))) is None:
+    sources = sorted({*lit, *glowing})
+    if not sources or (ground := ground_below(scene, sources)) is None:
         return None
-    low, high = scene.boxes[sorted(lit)].transpose(1, 0, 2)
+    low, high = scene.boxes[sources].transpose(1, 0, 2)
     points = GroundPoints(ground, scene.objects.index(ground.ground), np.stack([low.min(axis=0), high.max(axis=0)]))
-    total = np.zeros(points.points.shape)
+    total = emitted_irradiance(scene, glowing, points) if glowing else np.zeros(points.points.shape)
     for i, body in lit.items():
         others = [other.nearest for other in lit.values() if other is not body]
         if body.casters.opaque is not None and len(scene.opaque) > 1:

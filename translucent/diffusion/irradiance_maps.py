@@ -30,7 +30,14 @@ from translucent.diffusion.entering import (
     windings_at,
 )
 from translucent.diffusion.entering_rays import EnteringRays, two_of_many
-from translucent.diffusion.exchange import ROUNDS, OpaqueSurfaces, cosine_directions, direct_irradiance, hemispheres
+from translucent.diffusion.exchange import (
+    ROUNDS,
+    GroundPoints,
+    OpaqueSurfaces,
+    cosine_directions,
+    direct_irradiance,
+    hemispheres,
+)
 from translucent.diffusion.grid import BodyGrid, body_grid, nearest_samples
 from translucent.diffusion.lit_body import LitBody, own_frame
 from translucent.diffusion.photons import BATCH, MOST_SURFACES, Photons, PhotonSegments, PhotonSegmentTracer, joined
@@ -38,6 +45,7 @@ from translucent.diffusion.sides import GridPlacement, SurfaceSides, beside
 from translucent.formulas import optics
 from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.formulas.interface import refracted_direction
+from translucent.planning.rendered import Treatment, treatment_of
 from translucent.scene.scene import Object, Scene
 
 #: Samples on each object, of all together, and paths from each: the fit of the volume takes the mean of about 16.
@@ -114,27 +122,34 @@ def irradiance_maps(scene: Scene, objects: Sequence[int], photons: int = 0) -> d
     photons : int
         Number of photons that carry the light of lights to objects inside bodies. With 0, it comes straight.
     """
-    samples: dict[int, _Samples] = {}
-    count = 0
-    for i in objects:
-        own = own_frame(scene.objects[i])
-        corners = own.world_vertices[own.mesh.faces]
-        sides = corners[:, 1:] - corners[:, :1]
-        area = 0.5 * float(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum())
-        grid = body_grid(own, np.sqrt(3.0 * area / min(SAMPLES, MOST_SAMPLES // len(objects))))
-        samples[i] = _Samples(grid, Pose.of(scene.objects[i].matrix)[0], count + np.arange(len(grid.points)))
-        count += len(grid.points)
-    gathering = _Gathering(scene, samples, count)
+    samples = _samples(scene, objects, min(SAMPLES, MOST_SAMPLES // len(objects)))
+    gathering = _Gathering(scene, samples)
     lit = gathering.enclosed if photons else set()
     irradiance = gathering.irradiance(lit, photons)
     return {i: own.map(irradiance, lit=i in lit) for i, own in samples.items()}
 
 
+def _samples(scene: Scene, objects: Sequence[int], count: int) -> dict[int, _Samples]:
+    """Samples on closed objects, by their numbers, and about `count` on each."""
+    found: dict[int, _Samples] = {}
+    first = 0
+    for i in objects:
+        own = own_frame(scene.objects[i])
+        corners = own.world_vertices[own.mesh.faces]
+        sides = corners[:, 1:] - corners[:, :1]
+        area = 0.5 * float(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum())
+        grid = body_grid(own, np.sqrt(3.0 * area / count))
+        found[i] = _Samples(grid, Pose.of(scene.objects[i].matrix)[0], first + np.arange(len(grid.points)))
+        first += len(grid.points)
+    return found
+
+
 class _Gathering:
     """Paths from all samples, and the light that they find."""
 
-    def __init__(self, scene: Scene, samples: dict[int, _Samples], count: int) -> None:
-        self.scene, self.samples, self.count = scene, samples, count
+    def __init__(self, scene: Scene, samples: dict[int, _Samples]) -> None:
+        self.scene, self.samples = scene, samples
+        self.count = sum(len(own.numbers) for own in samples.values())
         self.tracer = PhotonSegmentTracer(scene, np.random.default_rng(0))
         self.surfaces = OpaqueSurfaces(scene.opaque)
         self.dimming = dimming_bodies(scene, -1)
@@ -146,7 +161,7 @@ class _Gathering:
         numbers = {id(item): k for k, item in enumerate(self.surfaces.objects)}
         self.opaque = np.array([numbers.get(id(item), -1) for item in scene.objects])
         self.inside = windings_at(scene, self.starts, self.normals)
-        self.first: Array = np.zeros((count, 3))
+        self.first: Array = np.zeros((self.count, 3))
         #: Sample that receives light, sample that sends it, and the fraction that arrives.
         self.links: list[tuple[Integers, Integers, Array]] = []
 
@@ -238,6 +253,87 @@ class _Gathering:
             return light_passed(self.dimming, starts, directions, distance)
 
         return direct_irradiance(points, normals, self.scene.lights, self.surfaces.caster, passed)
+
+
+#: Samples on surfaces of clear bodies that emit, in all, paths from each, and classes of angles with the normal.
+EMITTERS, EMITTED_RAYS, ANGLES = 1024, 16, 8
+
+#: Start of paths into a body above its surface, as a fraction of a cell: float32 must tell the two apart.
+_BEFORE = 1e-2
+
+#: Texels that are lit together.
+_TEXELS = 256
+
+
+def emitted_irradiance(scene: Scene, bodies: Sequence[int], points: GroundPoints) -> Array:
+    """(texels, 3): irradiance on a ground by what media of clear bodies emit.
+
+    These bodies do not hide each other, or themselves: their light goes through.
+
+    Parameters
+    ----------
+    scene : Scene
+    bodies : sequence of int
+        Those that emit, and clear ones around them.
+    points : GroundPoints
+    """
+    samples = _samples(scene, bodies, EMITTERS // len(bodies))
+    normals = np.concatenate([own.normals for own in samples.values()])
+    starts = np.concatenate([own.points + _BEFORE * own.grid.cells.step * own.normals for own in samples.values()])
+    areas = np.concatenate([own.grid.areas for own in samples.values()])
+    outside = ~windings_at(scene, starts, normals).any(axis=1)
+    starts, normals, areas = starts[outside], normals[outside], areas[outside]
+    radiance, by_angle = _emitted_radiance(scene, bodies, starts, normals)
+    hiding = [
+        item
+        for i, item in enumerate(scene.objects)
+        if i != points.number and (item.medium is None or treatment_of(item) is Treatment.DIFFUSION)
+    ]
+    caster = opaque_surfaces(hiding)
+    found = np.zeros(points.points.shape)
+    for part in np.array_split(np.arange(len(found)), len(found) // _TEXELS + 1):
+        towards = starts - points.points[part, None]
+        square = (towards**2).sum(axis=2)
+        above = np.maximum(towards @ points.normal, 0.0)
+        below = np.maximum(-(towards * normals).sum(axis=2), 0.0)
+        # Each sample is a disc of its area (Wallace, Elmquist & Haines 1989).
+        factor = above * below * areas / (square * (square + areas / np.pi))
+        if caster is not None:
+            texel, sample = np.nonzero(factor)
+            ways = towards[texel, sample]
+            hidden = caster.caster.nearest(starts[sample] - ways, ways)[1] < 1.0
+            factor[texel[hidden], sample[hidden]] = 0.0
+        cosine = below / np.sqrt(square)
+        factor *= np.interp(cosine, (np.arange(ANGLES) + 0.5) / ANGLES, by_angle)
+        found[part] = factor @ radiance
+    return found
+
+
+def _emitted_radiance(scene: Scene, bodies: Sequence[int], starts: Array, normals: Array) -> tuple[Array, Array]:
+    """(s, 3): mean radiance that leaves clear bodies at samples of their surfaces, and its factor (a,) by the cosine.
+
+    Paths back into a body end where they leave it: what comes there is the light of others.
+    """
+    emission = np.zeros((len(scene.objects), 3))
+    emission[list(bodies)] = [scene.source(scene.objects[i]) for i in bodies]
+    tracer = PhotonSegmentTracer(scene, np.random.default_rng(0))
+    owner, out = hemispheres(normals, EMITTED_RAYS)
+    found = np.zeros((len(owner), 3))
+    windings = np.zeros((len(owner), len(scene.objects)), np.int16)
+    going = tracer.begun_at(starts[owner], -out, np.ones((len(owner), 3)), windings)
+    for _ in range(MOST_SURFACES):
+        step = tracer.step(going)
+        on = step.segments
+        mean = optics.mean_transmittance(on.extinction * on.length[:, None])
+        found[on.number] += on.power * (on.filling @ emission) * mean * on.length[:, None]
+        going = step.going.where(step.going.windings.any(axis=1))
+        if not len(going.number):
+            break
+    cosine = (out * normals[owner]).sum(axis=1)
+    angle = np.minimum((cosine * ANGLES).astype(np.int64), ANGLES - 1)
+    by_angle = np.bincount(angle, found.sum(axis=1), ANGLES) / np.maximum(np.bincount(angle, minlength=ANGLES), 1)
+    mean = found.reshape(len(starts), EMITTED_RAYS, 3).mean(axis=1)
+    return mean, by_angle / max(float(found.sum(axis=1).mean()), np.finfo(np.float64).tiny)
 
 
 #: Paths from all samples of a body together, and from each at least and at most.

@@ -29,6 +29,7 @@ def diffusion_key(plan: RenderPlan) -> Hashable:
     scene, caustics = plan.scene, plan.caustics
     followed = caustics is not None and media_lit_by_photons(scene)
     bending = (caustics.in_media, caustics.seed, bending_key(scene)) if caustics is not None and followed else ()
+    glowing = (plan.glowing, bending_key(scene)) if plan.glowing else ()
     exchange = (plan.exchanging, photons_on_opaque(plan), bending_key(scene)) if plan.exchanging else ()
     enclosing = bending_key(scene) if enclosed_bodies(scene) else ()
     bodies = tuple(
@@ -47,7 +48,7 @@ def diffusion_key(plan: RenderPlan) -> Hashable:
     lights = tuple(light_key(light) for light in scene.lights)
     dimming = tuple((i, dimming_key(item)) for i, item in enumerate(scene.objects) if may_dim(item))
     shadows = bool(scene.environment_shadows)  # of bodies on a ground, see `ground_map`
-    return (plan.diffusion, bodies, opaque, lighting, lights, dimming, bending, exchange, enclosing, shadows)
+    return (plan.diffusion, bodies, opaque, lighting, lights, dimming, bending, exchange, glowing, enclosing, shadows)
 
 
 def environment_key(around: Environment) -> Hashable:

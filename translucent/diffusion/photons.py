@@ -66,6 +66,8 @@ class PhotonSegments:
         An interface has refracted or reflected them before they have entered.
     lands : (n,) bool
         They end on an opaque surface.
+    number : (n,) int64
+        Of the photons.
     """
 
     origins: Array
@@ -80,6 +82,7 @@ class PhotonSegments:
     entered: Integers
     bent_before: Mask
     lands: Mask
+    number: Integers
 
     def where(self, chosen: Mask | Integers) -> PhotonSegments:
         """Selection of segments."""
@@ -277,6 +280,7 @@ class PhotonSegmentTracer:
             going.entered,
             going.bent_before,
             lands,
+            going.number,
         )
         # Behind a surface that refracts or reflects, no light comes straight from the other side.
         after.before = np.where(straight[:, None], filling, self._filling(after.windings, after.since))

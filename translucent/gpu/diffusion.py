@@ -55,8 +55,8 @@ class DiffusedTexture:
         self.first_layers: dict[int, int] = {}
         parts = fields.surfaces | fields.volumes | fields.maps
         volumes = {number: part.volumes for number, part in parts.items()}
-        shapes = np.array([values.shape for arrays in volumes.values() for values in arrays])
-        extent = shapes[:, 0].max(), shapes[:, 1].max(), shapes[:, 2].sum()
+        shapes = np.array([values.shape[:3] for arrays in volumes.values() for values in arrays]).reshape(-1, 3)
+        extent = shapes[:, 0].max(initial=1), shapes[:, 1].max(initial=1), shapes[:, 2].sum()
         if (ground := fields.ground) is not None:
             extent = max(extent[0], len(ground.values)), max(extent[1], len(ground.values)), extent[2] + 1
         width, height, layers = (unlike_powers(int(side)) for side in extent)

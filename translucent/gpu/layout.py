@@ -289,7 +289,7 @@ LIGHTS = UniformBlock(
         ("light_disc", "f4", (MAX_LIGHTS, 4)),  # vector to the center of the sphere, and its radius in metres
         ("light_cone", "f4", (MAX_LIGHTS, 4)),  # as cone_attenuation takes it
         ("light_count", "i4", ()),  # that surfaces are lit by
-        ("ground_light_layer", "f4", (2,)),  # of the texture of diffused light, 0 for none, and texels along a side
+        ("ground_light_layer", "f4", (2,)),  # of the texture of diffused light, and texels along a side, 0 for none
         ("ground_light_plane", "f4", (4,)),  # unit normal, and metres along it from the center of the media
         ("ground_light_right", "f4", (4,)),  # position on the map, from a point
         ("ground_light_up", "f4", (4,)),

@@ -16,6 +16,7 @@ from translucent.errors import InputError
 from translucent.media.medium import Medium
 from translucent.planning.passes import Note, NoteKind
 from translucent.planning.rendered import Treatment, treatment_of
+from translucent.scene.grounds import ground_below
 from translucent.scene.scene import Object, Scene, first_overlap, object_names
 from translucent.scene.texture import Falloff, Texture
 
@@ -86,6 +87,21 @@ def _can_be_traced(scene: Scene) -> bool:
     return all(body.density is None for body in scene.bodies) and all(body.mesh.diagnosis.solid for body in solids)
 
 
+def glowing_bodies(scene: Scene) -> tuple[int, ...]:
+    """Numbers of the clear bodies that light a flat ground below by what they emit, and of clear bodies around these.
+
+    None where paths through them cannot be traced.
+    """
+    clear = [i for i, body in enumerate(scene.objects) if _is_clear(body)]
+    emitting = [i for i in clear if (medium := scene.objects[i].medium) and medium.emits]
+    if not emitting or not _can_be_traced(scene):
+        return ()
+    bounds = [scene.objects[i].bounds for i in emitting]
+    low, high = np.reshape(bounds, (-1, 2, 3)).transpose(1, 0, 2)
+    found = tuple(i for i in clear if i in emitting or _may_be_inside(scene.objects[i], low, high))
+    return found if ground_below(scene, found) is not None else ()
+
+
 def enclosed_bodies(scene: Scene) -> tuple[int, ...]:
     """Numbers of the bodies in which light diffuses, inside the bounds of a clear body that bends light, and no other.
 
@@ -104,6 +120,12 @@ def enclosed_bodies(scene: Scene) -> tuple[int, ...]:
 
     found = tuple(i for i, body in diffusing.items() if within(body, bending) and not within(body, diffusing.values()))
     return found if found and _can_be_traced(scene) else ()
+
+
+def _is_clear(body: Object) -> bool:
+    """Test whether a body is filled with a medium that does not scatter."""
+    solid = body.sheet_thickness is None and not body.covers and body.mesh.diagnosis.solid
+    return solid and body.medium is not None and not body.medium.scatters and treatment_of(body) is Treatment.SINGLE
 
 
 def _clear_bodies(scene: Scene) -> list[Object]:

@@ -246,8 +246,11 @@ def shadow_effects(scene: Scene) -> list[Note]:
     return notes
 
 
-def reflected_effects(scene: Scene, exchanging: Sequence[int]) -> list[Note]:
-    """Notes on light that opaque objects do not get; `exchanging` are those with light of all kinds."""
+def reflected_effects(scene: Scene, exchanging: Sequence[int], glowing: Sequence[int]) -> list[Note]:
+    """Notes on light that opaque objects do not get.
+
+    `exchanging` are those with light of all kinds, and `glowing` the bodies whose emission lights the ground.
+    """
     items, held, texts = scene.objects, held_objects(scene), []
     left_out = [i for i in held if i not in exchanging or _is_metal(items[i])]
     if held and exchanging and scene.lights:
@@ -268,11 +271,13 @@ def reflected_effects(scene: Scene, exchanging: Sequence[int]) -> list[Note]:
             f"{object_names(lamps)}: the light that these surfaces emit does not reach {object_names(unlit)}; "
             "--method path-traced includes this light"
         )
-    glowing = [body for body in scene.bodies if body.medium is not None and body.medium.emits]
-    silent = [body for body in glowing if treatment_of(body) is not Treatment.DIFFUSION]
-    if silent and scene.opaque:
+    emitting = [body for body in scene.bodies if body.medium is not None and body.medium.emits]
+    silent = [body for body in emitting if treatment_of(body) is not Treatment.DIFFUSION]
+    ground = ground_below(scene, glowing) if glowing else None
+    dark = [item for item in scene.opaque if ground is None or item is not ground.ground]
+    if silent and dark:
         texts.append(
-            f"{object_names(silent)}: the light that these media emit does not reach {object_names(scene.opaque)}: "
+            f"{object_names(silent)}: the light that these media emit does not reach {object_names(dark)}: "
             "black there if nothing else shines; --method path-traced includes this light"
         )
     return [Note(NoteKind.REFLECTED_LIGHT, text) for text in texts]

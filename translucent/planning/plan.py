@@ -16,6 +16,7 @@ from translucent.planning.assembly import COSTS, assembled
 from translucent.planning.bodies import (
     MAX_SLOTS,
     exchanging_objects,
+    glowing_bodies,
     media_differ,
     medium_slots,
     open_around_eye,
@@ -153,10 +154,11 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
         rendered = rendered_scene(scene, treatments)
         found = _thickness(rendered, request, machine, ambient=_scatters_ambient(scene, treatments))
         notes = layers_instead(scene, treatments.refusals)
-        if found.interfaces is not None:
-            exchanging = exchanging_objects(rendered) if _exchanges(found.interfaces, request) else ()
-            found = replace(found, exchanging=exchanging)
-            notes = (*reflected_effects(rendered, exchanging), *notes)
+        if _finds_light(request):
+            traced = found.interfaces is not None and found.interfaces.traced
+            exchanging = exchanging_objects(rendered) if traced else ()
+            found = replace(found, exchanging=exchanging, glowing=glowing_bodies(scene))
+        notes = (*reflected_effects(rendered, found.exchanging, found.glowing), *notes)
         found = replace(found, diffusion=treatments.diffusion, unmodelled=(*found.unmodelled, *notes))
     else:
         _check_paths(scene, request, paths, machine)
@@ -195,10 +197,10 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
     return found if found.traced else _with_shadows(found, scene, machine)
 
 
-def _exchanges(interfaces: InterfaceMode, request: RenderRequest) -> bool:
-    """True if the light on opaque objects in clear bodies is found by way of the interfaces."""
+def _finds_light(request: RenderRequest) -> bool:
+    """True if the light that bodies send to opaque objects is found before anything is drawn."""
     scattering = request.scattering
-    return interfaces.traced and not request.over_backdrop and (scattering is None or isinstance(scattering, Diffusion))
+    return not request.over_backdrop and (scattering is None or isinstance(scattering, Diffusion))
 
 
 def _denoised_note(found: RenderPlan) -> Note:

@@ -118,6 +118,9 @@ class RenderPlan:
         Then, of the maps of lights, and of the maps of the environment if they differ.
     exchanging : tuple of int
         Numbers of the opaque objects whose light is found by way of interfaces and of each other.
+    glowing : tuple of int
+        Numbers of the clear bodies that light a flat ground below them by what their media emit, and of clear bodies
+        around these.
     textured : bool
         Rays and photons on the GPU read textures of surfaces wherever they hit one.
     request : RenderRequest
@@ -141,6 +144,7 @@ class RenderPlan:
     shadows: ShadowMaps = field(default_factory=ShadowMaps)
     maps: tuple[MapPlan, ...] = ()
     exchanging: tuple[int, ...] = ()
+    glowing: tuple[int, ...] = ()
     textured: bool = False
     request: RenderRequest = field(default_factory=RenderRequest, compare=False)
 
@@ -167,7 +171,7 @@ class RenderPlan:
     @property
     def solves(self) -> bool:
         """True if light is solved for before anything is drawn: on grids, or on opaque objects."""
-        return self.diffuses or bool(self.exchanging)
+        return self.diffuses or bool(self.exchanging or self.glowing)
 
     @property
     def multiple_scattering(self) -> str:

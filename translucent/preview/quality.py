@@ -352,7 +352,9 @@ def _on_small_grid(scene: Scene, plan: RenderPlan) -> RenderPlan | None:
         return None
     treatments = ((i, treatment_of(item)) for i, item in enumerate(plan.scene.objects))
     own = {i: treatment for i, treatment in treatments if treatment is not Treatment.SINGLE}
-    return replace(plan, diffusion=SMALL, exchanging=()) if choose_treatments(scene, SMALL).of == own else None
+    return (
+        replace(plan, diffusion=SMALL, exchanging=(), glowing=()) if choose_treatments(scene, SMALL).of == own else None
+    )
 
 
 def _bodies(plan: RenderPlan) -> Hashable:

@@ -54,8 +54,16 @@ class Mirror(NamedTuple):
 
 
 def mirror_of(scene: Scene) -> Mirror | None:
-    """Ground of a scene that mirrors its bodies, if it has one: the first flat shadow catcher with a smooth coat."""
-    return next((found for item in scene.objects if _is_smooth(item) and (found := _flat(item))), None)
+    """Flat surface of a scene that mirrors its objects, if it has one; its normal is towards the eye.
+
+    The first flat shadow catcher with a smooth coat, else the first other opaque object with one, or of smooth metal.
+    """
+    for item in sorted(scene.opaque, key=lambda item: not item.shadow_catcher):
+        if _is_smooth(item) and (found := _flat(item)) is not None:
+            if item.shadow_catcher or _is_above(scene, found):
+                return found
+            return Mirror(item, -found.normal, -found.height)
+    return None
 
 
 def ground_of(scene: Scene) -> Mirror | None:
@@ -85,12 +93,18 @@ def ground_from_above(scene: Scene) -> Mirror | None:
     """Ground of a scene that is viewed from above, and lit from there alone with one normal; None elsewhere."""
     if (ground := ground_of(scene)) is None:
         return None
-    surface, eye = ground.ground.surface, scene.camera.eye
+    surface = ground.ground.surface
     if surface is not None and (surface.normal_texture is not None or surface.diffuse_transmission > 0):
         return None
-    level = scene.camera.fov_y is None
-    above = -float(scene.camera.forward @ ground.normal) if level else float(eye @ ground.normal) - ground.height
-    return ground if above > 0 else None
+    return ground if _is_above(scene, ground) else None
+
+
+def _is_above(scene: Scene, ground: Mirror) -> bool:
+    """Test whether a scene is viewed from the side of a ground that its normal points to."""
+    camera = scene.camera
+    if camera.fov_y is None:
+        return float(camera.forward @ ground.normal) < 0.0
+    return float(camera.eye @ ground.normal) > ground.height
 
 
 def lit_side(scene: Scene) -> Array | None:
@@ -107,11 +121,12 @@ def lit_side(scene: Scene) -> Array | None:
 
 def _is_smooth(item: Object) -> bool:
     surface = item.surface
+    if surface is None or (surface.metallic == 0.0 and surface.ior == 1.0):
+        return False
+    textured = surface.color_texture is not None or item.mesh.colors is not None
+    even = not textured and surface.iridescence == 0.0 and surface.clearcoat == 0.0
     return (
-        item.shadow_catcher
-        and surface is not None
-        and surface.ior != 1.0
-        and surface.metallic == 0
+        (surface.metallic == 0.0 or even)
         and surface.roughness <= MOST_ROUGHNESS
         and surface.roughness_texture is None
         and surface.normal_texture is None

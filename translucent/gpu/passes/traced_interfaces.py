@@ -278,13 +278,19 @@ def _mirroring(scene: Scene, mirror: Mirror) -> dict[str, Any]:
     surface = mirror.ground.surface
     assert surface is not None
     height = mirror.height - float(mirror.normal @ media_center(scene))
-    mirroring = surface.roughness, surface.ior
-    return {"mirrored": 1, "mirror_plane": (*mirror.normal, height), "mirror_surface": mirroring}
+    return {
+        "mirrored": 1,
+        "mirror_plane": (*mirror.normal, height),
+        "mirror_surface": (surface.roughness, surface.ior),
+        "mirror_metal": (*mirror.ground.base_color, surface.metallic),
+    }
 
 
 def mirrored_part(job: FrameJob, mirror: Mirror) -> Part:
     """Pixels in which the ground may mirror bodies; row 0 is the top one."""
-    twins = [replace(item, transform=mirror.matrix @ item.matrix) for item in job.scene.shown]
+    twins = [
+        replace(item, transform=mirror.matrix @ item.matrix) for item in job.scene.shown if item is not mirror.ground
+    ]
     width, rows = job.targets.size
     boxes, radii = np.array([twin.bounds for twin in twins]), np.array([twin.radius for twin in twins])
     edges = extents(boxes, radii, job.scene.camera, (width, rows))
