@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -10,8 +11,10 @@ import pytest
 
 import translucent as tl
 from translucent.assets import mesh_path
-from translucent.bench.cases import CASES, Case
+from translucent.bench.cases import CASES, DAY, GLASS, WAX, Case
+from translucent.bench.shapes import square_ground
 from translucent.bench.truth import CaseTruth, stored_truth
+from translucent.geometry.solids import Sphere
 
 #: Error in a channel's mean, or in blocks of pixels, as a fraction of the mean, that no plan may keep to itself.
 SILENT = 0.05
@@ -77,6 +80,42 @@ def test_notes_tell_how_wrong_bodies_are_that_are_lit_from_behind(
     print("lit from behind", np.round(bias, 3), clause)
     assert -dark < bias.min(), frame.plan
     assert bias.max() < bright, frame.plan
+
+
+def _metal() -> tuple[tl.Scene, str]:
+    """A ball of metal beside wax, on a ground."""
+    metal = tl.Object(_ball((0.75, 0.61, 0.2)), surface=tl.Surface(color=(0.9, 0.8, 0.6), metallic=1.0, roughness=0.1))
+    wax = tl.Object(_ball((-0.7, 0.61, 0.0)), WAX)
+    scene = tl.Scene([wax, metal, square_ground((0.7, 0.15, 0.1))], STILL, environment=DAY, environment_shadows=16)
+    return scene, "metals reflect the environment alone"
+
+
+def _lamp() -> tuple[tl.Scene, str]:
+    """A ball of glass before a lamp."""
+    lamp = tl.SphereLight((-0.3, 0.3, -4.0), 20.0, 0.5)
+    return tl.Scene([tl.Object(_ball((0.0, 0.9, 0.0)), GLASS)], STILL, [lamp], DAY), "lights behind are invisible"
+
+
+STILL = tl.Camera.look_at((0.5, 1.8, 4.8), (0, 0.8, 0), fov_y=30)
+
+
+def _ball(center: tuple[float, float, float]) -> tl.Mesh:
+    return Sphere(radius=0.6, center=center).tessellate(32)
+
+
+@pytest.mark.parametrize("make", [_metal, _lamp])
+def test_notes_tell_how_wrong_what_is_left_out_is(
+    make: Callable[[], tuple[tl.Scene, str]], renderer: tl.Renderer
+) -> None:
+    """More than a twentieth, and less than the notes say, of the light of a block, or of the mean if that is larger."""
+    (scene, words), size = make(), (32, 24)
+    frame = renderer.render(scene, size, samples=4)
+    truth = renderer.render(scene, size, samples=4, method=tl.PathTraced(128)).radiance
+    found, true = (one.reshape(6, 4, 8, 4, 3).mean(axis=(1, 3)) for one in (frame.radiance, truth))
+    off = float((np.abs(found - true) / np.maximum(true, true.mean())).max())
+    (clause,) = (text for text in clauses(frame.plan) if words in text)
+    print(words, off, clause)
+    assert SILENT < off < shares(clause)[0]
 
 
 def test_notes_name_what_they_are_about() -> None:

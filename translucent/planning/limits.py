@@ -19,8 +19,9 @@ from translucent.planning.bodies import (
 from translucent.planning.interfaces import InterfaceMode
 from translucent.planning.methods import Method
 from translucent.planning.passes import Note, NoteKind
-from translucent.planning.rendered import Treatment, treatment_of
-from translucent.scene.grounds import ground_below
+from translucent.planning.rendered import Treatment, scatterer_of, treatment_of
+from translucent.scene.grounds import Mirror, ground_below
+from translucent.scene.lights import AreaLight
 from translucent.scene.scene import Object, Scene, object_names
 
 #: Largest number of lights that shine on surfaces.
@@ -28,6 +29,12 @@ MAX_LIGHTS = 32
 
 #: Largest number of lights that are followed into media.
 MAX_SCATTER_LIGHTS = 8
+
+#: Transmittance of the mean chord of a body from which on lights behind the body are visible through it.
+CLEAR = 0.01
+
+#: Reduced optical depth of scattering over the mean thickness of a body below which diffusion is an approximation.
+THIN = 0.5
 
 #: Optical depth across a scene beyond which float32 places are too coarse for where light is scattered.
 DENSE = 1e5
@@ -246,10 +253,33 @@ def shadow_effects(scene: Scene) -> list[Note]:
     return notes
 
 
-def reflected_effects(scene: Scene, exchanging: Sequence[int], glowing: Sequence[int]) -> list[Note]:
+def hidden_lights(scene: Scene) -> tuple[Note, ...]:
+    """Note on clear bodies before lights with a size, which no ray through these bodies shows."""
+    eye, names = scene.camera.eye, list[Object]()
+    places = [np.asarray(light.position) for light in scene.lights if isinstance(light, AreaLight)]
+    for body in scene.bodies:
+        if body.medium is None or body.medium.ior == 1.0 or body.sheet_thickness is not None or body.covers:
+            continue
+        middle = body.bounds.mean(axis=0)
+        behind = any((place - middle) @ (eye - middle) < 0.0 for place in places)
+        if behind and body.medium.transmittance(2.0 * body.mean_thickness).max() >= CLEAR:
+            names.append(body)
+    if not names:
+        return ()
+    text = (
+        f"{object_names(names)}: lights behind are invisible through these bodies, whose pixels lack up to 95 % of "
+        "their light there; --method path-traced shows these lights"
+    )
+    return (Note(NoteKind.SPHERE_LIGHTS, text),)
+
+
+def reflected_effects(
+    scene: Scene, exchanging: Sequence[int], glowing: Sequence[int], mirror: Mirror | None
+) -> list[Note]:
     """Notes on light that opaque objects do not get.
 
-    `exchanging` are those with light of all kinds, and `glowing` the bodies whose emission lights the ground.
+    `exchanging` are those with light of all kinds, `glowing` the bodies whose emission lights the ground, and `mirror`
+    a flat surface that reflects the objects on it.
     """
     items, held, texts = scene.objects, held_objects(scene), []
     left_out = [i for i in held if i not in exchanging or _is_metal(items[i])]
@@ -264,12 +294,18 @@ def reflected_effects(scene: Scene, exchanging: Sequence[int], glowing: Sequence
             "refract onto these objects, and light that opaque objects reflect onto each other; --method path-traced "
             "includes this light"
         )
+    apart = [items[i] for i in held] + ([] if mirror is None else [mirror.ground])
+    if metals := [item for item in scene.opaque if _is_metal(item) and item not in apart]:
+        texts.append(
+            f"{object_names(metals)}: metals reflect the environment alone, without the objects around: up to 50 % "
+            "wrong; --method path-traced includes these reflections"
+        )
     lamps = [item for item in scene.opaque if item.surface is not None and item.surface.glows]
     unlit = [item for i, item in enumerate(items) if item.medium is None and i not in exchanging and item not in lamps]
     if lamps and unlit:
         texts.append(
-            f"{object_names(lamps)}: the light that these surfaces emit does not reach {object_names(unlit)}; "
-            "--method path-traced includes this light"
+            f"{object_names(lamps)}: the light that these surfaces emit does not reach {object_names(unlit)}: black "
+            "there if nothing else shines; --method path-traced includes this light"
         )
     emitting = [body for body in scene.bodies if body.medium is not None and body.medium.emits]
     silent = [body for body in emitting if treatment_of(body) is not Treatment.DIFFUSION]
@@ -341,6 +377,8 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
             f"{object_names(bodies)}: without details smaller than a cell of the diffusion grid: spikes and edges are "
             "up to 15 % too dark"
         )
+        if thin := [body for body in bodies if _is_thin(body)]:
+            text += f"; where light is hardly scattered twice, as in {object_names(thin)}, up to 15 % too dark"
         if scene.lights:
             text += (
                 "; where lights shine from behind, bodies are up to 30 % too dark, and rims up to 40 % too bright "
@@ -365,6 +403,15 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
             text += f"; light from these bodies does not reach {object_names(others)}: up to 10 % too dark there"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     return notes
+
+
+def _is_thin(body: Object) -> bool:
+    """Test whether most light that a body scatters leaves it without another event."""
+    medium = scatterer_of(body)
+    if medium is None or body.density is not None:
+        return False
+    depth = np.asarray(medium.scattering) * (1.0 - medium.anisotropy) * body.mean_thickness
+    return float(depth.max()) < THIN
 
 
 def _refraction_effects(scene: Scene, interfaces: InterfaceMode | None) -> list[Note]:

@@ -54,6 +54,7 @@ from translucent.planning.limits import (
     AMBIENT,
     MAX_LIGHTS,
     MAX_SCATTER_LIGHTS,
+    hidden_lights,
     layers_instead,
     mesh_limits,
     open_limits,
@@ -88,6 +89,7 @@ from translucent.planning.scattering import (
     rendered_scene,
 )
 from translucent.planning.shadow_maps import ShadowMaps, shadow_passes, shadows_left_out, usual_maps
+from translucent.scene.grounds import mirror_of
 from translucent.scene.lights import SPREADS, AreaLight, PositionalLight, SpotLight, with_points
 from translucent.scene.scene import Object, Scene, check_scene, object_names
 
@@ -149,7 +151,7 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
     diagnose_together(body.mesh for body in scene.bodies if body.sheet_thickness is None)
     paths = request.method if isinstance(request.method, PathTraced) else None
     if paths is None:
-        treatments = _treatments(scene, request, machine)
+        treatments, hidden = _treatments(scene, request, machine), hidden_lights(scene)
         scene, spheres = _with_point_lights(scene, rendered_scene(scene, treatments))
         rendered = rendered_scene(scene, treatments)
         found = _thickness(rendered, request, machine, ambient=_scatters_ambient(scene, treatments))
@@ -158,7 +160,9 @@ def plan_scene(scene: Scene, request: RenderRequest, capabilities: Capabilities 
             traced = found.interfaces is not None and found.interfaces.traced
             exchanging = exchanging_objects(rendered) if traced else ()
             found = replace(found, exchanging=exchanging, glowing=glowing_bodies(scene))
-        notes = (*reflected_effects(rendered, found.exchanging, found.glowing), *notes)
+        mirrors = machine.opengl and found.interfaces is not None and found.interfaces.traced
+        mirror = mirror_of(rendered) if mirrors else None
+        notes = (*reflected_effects(rendered, found.exchanging, found.glowing, mirror), *hidden, *notes)
         found = replace(found, diffusion=treatments.diffusion, unmodelled=(*found.unmodelled, *notes))
     else:
         _check_paths(scene, request, paths, machine)
