@@ -230,6 +230,13 @@ def test_rough_interfaces_are_darker_there_and_a_warning_says_so() -> None:
         describe(rough, SIZE)
 
 
+def test_paths_across_a_hundred_mean_free_paths_are_not_left_to_chance() -> None:
+    # A walk that crosses a slab of n mean free paths has about n^2 / 2 events: n^2 / (6 D) with D = 1 / 3.
+    events = 0.5 * 100.0**2
+    described, _ = describe(scene_of(tl.Object(BALL, WAX)), SIZE)
+    assert 0.95 ** max(events - described["integrator"]["rr_depth"], 0.0) > 0.5
+
+
 def read_element(element: ElementTree.Element) -> dict[str, Any]:
     """Dictionary of a plugin's element, as Mitsuba's manual pairs the two forms."""
     found: dict[str, Any] = {"type": element.get("type")}

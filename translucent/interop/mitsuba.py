@@ -58,8 +58,9 @@ NEAR, FAR = 0.1, 1e6
 #: Paths of each pixel.
 SAMPLES = 256
 
-#: Depth from which on Mitsuba ends paths by chance: shorter ones are not much noisier for it.
-ROULETTE = 100
+#: Depth from which on Mitsuba ends paths by chance, 1 in 20 at each event and more where they carry little. Light
+#: that crosses n mean free paths is scattered about n^2 / 2 times: with a depth of 100, hardly any path stands for it.
+ROULETTE = 100_000
 
 #: Roughness of an interface from which on its rough dielectric loses more than 2 % of the light.
 ROUGH = 0.25
