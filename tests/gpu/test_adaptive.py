@@ -14,11 +14,13 @@ import translucent.gpu.renderer as renderer_module
 from translucent.geometry.ray_caster import RayCaster
 from translucent.geometry.solids import Box, Sphere
 from translucent.gpu import adaptive
-from translucent.gpu.adaptive import isolated_pixels, uneven_part, wanted_samples
+from translucent.gpu.adaptive import isolated_pixels, lattice_variance, uneven_part, wanted_samples
 from translucent.gpu.job import FrameJob
 from translucent.gpu.placement import FaceExtents, Part
 from translucent.gpu.targets import read_floats
 from translucent.scene.camera import Window
+from translucent.scene.showcase import showcase
+from translucent.scene.stages import STAGES
 
 Floats = npt.NDArray[np.float32]
 
@@ -214,6 +216,29 @@ def test_isolated_pixels_are_found_and_edges_are_not() -> None:
     inside[19, 20] = False
     found = {(int(row), int(column)) for row, column in np.argwhere(isolated_pixels(level, inside))}
     assert found == {(4, 5), (15, 8), (12, 25)}
+    errors = np.full(level.shape, np.inf)
+    errors[4, 5] = 0.04  # of 0.3, half of which is more than three errors
+    errors[15, 8] = 0.04  # of 0.2
+    assert isolated_pixels(level, inside, errors)[4, 5] == 0.0
+    assert (isolated_pixels(level, inside, errors) > 0.0).sum() == 2
+
+
+def test_the_error_of_a_block_counts_with_lines_along_its_rows() -> None:
+    random = np.random.default_rng(4)
+    noise = random.standard_normal((4000, 8, 8))
+    found = np.mean([lattice_variance(parts) for parts in noise])
+    assert 1.0 / 64.0 < found < 1.5 / 64.0  # the larger of two estimates that are right in the mean
+    slope = np.add.outer(np.arange(8.0), 2.0 * np.arange(8.0))
+    assert lattice_variance(slope) < 0.1 * slope.mean(axis=0).var(ddof=1) / 8.0
+    # A line of random place, as wide as 1.3 rows: it is in one row or in two.
+    rows = np.arange(8.0)[:, None] + 0.5
+    places = random.uniform(2.0, 6.0, 500)
+    lines = [np.repeat(np.where(np.abs(rows - place) < 0.65, 1.0, 0.0), 8, axis=1) for place in places]
+    off = np.square([line.mean() - 1.3 / 8.0 for line in lines]).mean()
+    for turned in (False, True):
+        estimates = [lattice_variance(line.T if turned else line) for line in lines]
+        assert np.mean(estimates) > off
+        assert min(estimates) > 4.0 * lines[0].var() / 64.0
 
 
 @pytest.mark.parametrize(
@@ -275,6 +300,21 @@ def test_isolated_pixels_are_right(renderer: tl.Renderer, monkeypatch: pytest.Mo
     changed = (embree != before).any(axis=-1)
     assert 0 < changed.sum() < 10
     off = [np.abs(found - truth)[changed].max() for found in (embree, before)]
+    assert off[0] < 0.5 * off[1]
+
+
+def test_bubbles_smaller_than_a_pixel_take_more_blocks(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """64 samples of a pixel, a few of which see a bubble, are farther from a finer picture than more blocks."""
+    ice, (width, height) = Box((-0.03,) * 3, (0.03,) * 3).tessellate(), (64, 48)
+    scene = showcase(ice, "ice", (width, height), environment=STAGES["studio"].environment())
+    finer = renderer.render(scene, (4 * width, 4 * height), samples=16).radiance
+    truth = finer.reshape(height, 4, width, 4, 3).mean(axis=(1, 3))
+    more = renderer.render(scene, (width, height), samples=16).radiance
+    monkeypatch.setattr(adaptive, "ROUNDS_AGAIN", 1)
+    once = renderer.render(scene, (width, height), samples=16).radiance
+    changed = (more != once).any(axis=-1)
+    assert 0 < changed.sum() < 20
+    off = [np.square(found - truth)[changed].mean() for found in (more, once)]
     assert off[0] < 0.5 * off[1]
 
 

@@ -56,12 +56,13 @@ EDGES, NOISE = {"prior": 4.0, "by_edges": 1.0 / 3.0}, {"prior": 1e6, "by_edges":
 APART = 2.0
 
 #: A pixel is isolated that is farther from the median of the eight around it than so many spreads of the 24 around it,
-#: and from each of the eight by a fraction of that; and the least spread, as a fraction of the median.
-ISOLATED, ALONE, LEAST_SPREAD = 3.5, 0.45, 0.015
+#: and from each of the eight by a fraction of that; and the least spread, as a fraction of the median. It is sure that
+#: the pixel is so, by half of what it is off, if this is so many standard errors of its light.
+ISOLATED, ALONE, LEAST_SPREAD, SURE = 3.5, 0.45, 0.015, 3.0
 
 #: How often isolated pixels are looked for, at most: one may hide the next. And how many may be drawn enlarged, so that
 #: it takes a few percent of the time of a large picture: those that are farthest off. Rough interfaces show more noise.
-ROUNDS_AGAIN, MOST_ENLARGED, MOST_ROUGH_ENLARGED = 3, 64, 1024
+ROUNDS_AGAIN, MOST_ENLARGED, MOST_ROUGH_ENLARGED = 4, 64, 1024
 
 #: Samples from which those of the first look are chosen.
 _CHOICE = 32
@@ -158,52 +159,63 @@ class AdaptiveSampling:
         run_passes(leave_out)
 
     def _settle_isolated(self, job: FrameJob, samples: int, run_passes: Run) -> None:
-        """Take a sample of each of 8 x 8 parts of single pixels far off their neighbors.
+        """Take a sample of each of 8 x 8 parts of single pixels far off their neighbors, and more until that is sure.
 
         Their own samples may all have missed what is smaller than the pixel, or have hit it too often; and highlights
         are as wide as the normals within a sample. A pixel is drawn as a block of pixels, so that a few steps take the
         samples of many. They take the place of those before, which chose the pixel as they were far off: the mean of
-        all would be biased. Random microfacets may go wrong again, and are added up.
+        all would be biased. Few parts of a block may see a bubble in ice, or a random microfacet that mirrors a light:
+        while the error of its mean may be half of what a pixel is off, the pixel gets as many blocks again.
         """
-        rough, targets, shown, most = _is_rough(job), job.targets, job.view.shift, ENLARGED_ACROSS**2
-        light = read_floats(targets["bent"], 0, 4)
-        others = read_floats(targets["average"], 0, 4)
+        targets, shown = job.targets, job.view.shift
+        light, others = read_floats(targets["bent"], 0, 4), read_floats(targets["average"], 0, 4)
         inside, straight = (light[..., 3] > 0) & (others[..., 3] == 0), others[..., :3].sum(axis=-1) / samples
         inside &= min(targets.size) >= PIXEL_PARTS * ENLARGED_ACROSS
-        settled, sums, drawn = np.zeros(inside.shape, bool), [light], 0
-        limit = MOST_ROUGH_ENLARGED if rough else MOST_ENLARGED
+        blocks, variance, sums = np.zeros(inside.shape, int), np.zeros(inside.shape), [light]
+        left = MOST_ROUGH_ENLARGED if _is_rough(job) else MOST_ENLARGED
         for number in range(ROUNDS_AGAIN):
             level = light[..., :3].sum(axis=-1) / np.where(inside, light[..., 3], 1.0) + straight
-            spreads = isolated_pixels(level, inside) * (rough | ~settled)
+            errors = np.where(blocks > 0, np.sqrt(variance) / np.maximum(blocks, 1), np.inf)
+            spreads = isolated_pixels(level, inside, errors)
             pixels = np.argwhere(spreads > 0.0)
-            pixels = pixels[np.argsort(-spreads[tuple(pixels.T)], kind="stable")][: limit - drawn]
+            pixels = pixels[np.argsort(-spreads[tuple(pixels.T)], kind="stable")]
+            wanted = np.maximum(blocks[tuple(pixels.T)], 1)
+            pixels = np.repeat(pixels, wanted, axis=0)[:left]
             if not len(pixels):
                 break
             if not number:
                 sums.append(read_floats(targets["bent"], 1, 4))
-            job.sample, drawn = _most(samples) + number, drawn + len(pixels)
-            for first in range(0, len(pixels), most):
-                rows, columns = pixels[first : first + most].T
-                for whole, part in zip(sums, self._enlarged(job, columns, rows, run_passes), strict=True):
-                    whole[rows, columns] = part + settled[rows, columns, None] * whole[rows, columns]
-            settled[tuple(pixels.T)] = True
-        if drawn:
+            job.sample, left = _most(samples) + number, left - len(pixels)
+            for first in range(0, len(pixels), ENLARGED_ACROSS**2):
+                chosen = pixels[first : first + ENLARGED_ACROSS**2]
+                found = self._enlarged(job, chosen, blocks, run_passes)
+                for (row, column), *parts in zip(chosen.tolist(), *found, strict=True):
+                    for whole, part in zip(sums, parts, strict=True):
+                        whole[row, column] = part.sum(axis=(0, 1)) + (blocks[row, column] > 0) * whole[row, column]
+                    blocks[row, column] += 1
+                    variance[row, column] += lattice_variance(parts[0][..., :3].sum(axis=-1))
+        if blocks.any():
             for attachment, whole in zip(targets["bent"].color_attachments, sums, strict=True):
                 attachment.write(whole)
             # Blocks have replaced what the last sample shows, which a frame reads: it is drawn again.
             job.place(shown)
             run_passes(_all_but(job, PassName.INTERFACES))
 
-    def _enlarged(self, job: FrameJob, columns: Ints, rows: Ints, run_passes: Run) -> list[Floats]:
-        """Sums (n, 4) of the light of the parts of some pixels, and of its square, as `bent` has them."""
+    def _enlarged(self, job: FrameJob, pixels: Ints, before: Ints, run_passes: Run) -> list[Floats]:
+        """Light (n, 8, 8, 4) of the parts of some pixels (row, column), and its square, as `bent` has them.
+
+        Blocks of a pixel, which has had some (h, w) `before`, have their samples at other places of the parts.
+        """
         entered, bent, height = job.targets["entered"], job.targets["bent"], job.targets.size[1]
         covered = job.covered
         marks = np.zeros((height, job.targets.size[0]), np.float32)
-        blocks = [Part(left, top, left + PIXEL_PARTS, top + PIXEL_PARTS) for top, left in _corners(len(rows))]
-        job.enlarged = list(zip(columns.tolist(), rows.tolist(), strict=True))
+        blocks = [Part(left, top, left + PIXEL_PARTS, top + PIXEL_PARTS) for top, left in _corners(len(pixels))]
+        shifts = ((sobol_points(2 ** (ROUNDS_AGAIN - 1)) + 0.5) % 1.0 - 0.5) / PIXEL_PARTS
+        numbers = before[tuple(pixels.T)] + [(pixels[:i] == pixel).all(axis=1).sum() for i, pixel in enumerate(pixels)]
+        job.enlarged = [(column, row) for column, row in (pixels[:, ::-1] + shifts[numbers]).tolist()]
         try:
-            for block, (column, row) in zip(blocks, job.enlarged, strict=True):
-                job.enlarge(column, row, block)
+            for block, (row, column), place in zip(blocks, pixels.tolist(), job.enlarged, strict=True):
+                job.enlarge(column, row, place, block)
                 entered.scissor = block.flipped(height).scissor
                 run_passes(_all_but(job, PassName.INTERFACES))
                 marks[block.bottom : block.top, block.left : block.right] = 1.0
@@ -224,7 +236,7 @@ class AdaptiveSampling:
         found = (bent.read(drawn.scissor, 4, attachment=number, dtype="f4") for number in range(2))
         shape = drawn.top // PIXEL_PARTS, PIXEL_PARTS, drawn.right // PIXEL_PARTS, PIXEL_PARTS, 4
         return [
-            np.frombuffer(part, np.float32).reshape(shape).sum(axis=(1, 3)).reshape(-1, 4)[: len(rows)]
+            np.frombuffer(part, np.float32).reshape(shape).swapaxes(1, 2).reshape(-1, *shape[1:4:2], 4)[: len(pixels)]
             for part in found
         ]
 
@@ -353,8 +365,13 @@ def uneven_part(light: Floats, difference: float) -> Part:
     return bounds.wider(1, (level.shape[1], level.shape[0]))
 
 
-def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_]) -> Floats:
-    """(h, w): how many spreads pixels of a picture (h, w) are off, if all around are `inside` (h, w); else 0."""
+def isolated_pixels(
+    level: Floats, inside: npt.NDArray[np.bool_], errors: npt.NDArray[np.float64] | None = None
+) -> Floats:
+    """(h, w): how many spreads pixels of a picture (h, w) are off, if all around are `inside` (h, w); else 0.
+
+    Also 0 where that is sure, by the standard errors (h, w) of the pixels.
+    """
     found, (height, width) = np.zeros(level.shape, np.float32), level.shape
     steps = [(y, x) for y in range(-2, 3) for x in range(-2, 3) if (y, x) != (0, 0)]
     padded = np.pad(inside, 1)
@@ -372,8 +389,21 @@ def isolated_pixels(level: Floats, inside: npt.NDArray[np.bool_]) -> Floats:
     distance = np.abs(own - median)
     spread = np.maximum(spread, LEAST_SPREAD * np.abs(median))
     far = (distance > ISOLATED * spread) & (off > ALONE * distance)
+    if errors is not None:
+        far &= 0.5 * distance < SURE * errors[row, column]
     found[row[far], column[far]] = distance[far] / np.maximum(spread[far], 1e-12)
     return found
+
+
+def lattice_variance(parts: Floats) -> float:
+    """Variance of the mean of parts (n, n) of a pixel, which are samples in rows and columns.
+
+    That of the means of rows, or of columns if that is larger: a line along a row is in all of its parts or in none. By
+    differences of neighbors, as a slope leaves the mean right (Wolter 1984, "An investigation of some estimators of
+    variance for systematic sampling").
+    """
+    steps = (np.diff(parts.mean(axis=axis, dtype=np.float64)) for axis in (0, 1))
+    return float(max(np.square(step).mean() for step in steps) / (2.0 * len(parts)))
 
 
 def _looks(samples: int) -> set[int]:

@@ -277,8 +277,8 @@ class FrameJob(CameraView):
         Of a sample, that alone is drawn now.
     unsettled : dict of str to (n,) uint32
         Of a job that is bending: pixels that need more samples, by the name of their target.
-    enlarged : list of (int, int), optional
-        Columns and rows of pixels whose parts are drawn, each as a block of pixels from the top left corner on.
+    enlarged : list of (float, float), optional
+        Upper left corners (right, down) of pixels whose parts are drawn, each as a block of pixels.
     faces : dict of int to (k,) int
         By number of the object: faces that are drawn of its interface, where it is not all of them.
     few_opaque : bool
@@ -306,7 +306,7 @@ class FrameJob(CameraView):
     for_map = path_only = two_media = projected_depth = bent_apart = bending = any_eye = False
     few_opaque = holds_opaque = has_blurs = shows_ground_alone = rest_is_clear = False
     uneven: Part | None = None
-    enlarged: list[tuple[int, int]] | None = None
+    enlarged: list[tuple[float, float]] | None = None
     photon_light: tuple[moderngl.Texture, int, tuple[int, int]] | None = None
 
     def __init__(
@@ -393,11 +393,14 @@ class FrameJob(CameraView):
             self.covered = part_of(self._extents[scene.filled], shift, self.targets.size)
         self._cleared.clear()
 
-    def enlarge(self, column: int, row: int, block: Part) -> None:
-        """Write the uniforms for a pixel that is drawn as a square block of pixels, rows down."""
+    def enlarge(self, column: int, row: int, place: tuple[float, float], block: Part) -> None:
+        """Write the uniforms for a pixel that is drawn as a square block of pixels, rows down.
+
+        The block has its upper left corner at this place (right, down) in the picture.
+        """
         camera, size, parts = self.scene.camera, self.targets.size, block.right - block.left
         window = camera.window or Window(0, 0, size)
-        left, top = parts * (window.left + column) - block.left, parts * (window.top + row) - block.bottom
+        left, top = parts * (window.left + place[0]) - block.left, parts * (window.top + place[1]) - block.bottom
         self.choose_faces(np.array([row << 15 | column], np.uint32))
         enlarged = Window(left, top, (parts * window.whole[0], parts * window.whole[1]))
         self.uniforms.place(SampleView(replace(camera, window=enlarged), size))
