@@ -326,7 +326,7 @@ def _emitted_radiance(scene: Scene, bodies: Sequence[int], starts: Array, normal
         on = step.segments
         mean = optics.mean_transmittance(on.extinction * on.length[:, None])
         found[on.number] += on.power * (on.filling @ emission) * mean * on.length[:, None]
-        going = step.going.where(step.going.windings.any(axis=1))
+        going = step.going.where(np.asarray(step.going.windings.any(axis=1)))
         if not len(going.number):
             break
     cosine = (out * normals[owner]).sum(axis=1)
