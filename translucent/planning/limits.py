@@ -373,12 +373,15 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
         )
         notes.append(Note(NoteKind.SPREAD_INSIDE, text))
     if bodies := [body for body in scene.bodies if treatment_of(body) is Treatment.DIFFUSION]:
+        ground = ground_below(scene, [i for i, body in enumerate(scene.objects) if body in bodies])
         text = (
             f"{object_names(bodies)}: without details smaller than a cell of the diffusion grid: spikes and edges are "
             "up to 15 % too dark"
         )
         if thin := [body for body in bodies if _is_thin(body)]:
-            text += f"; where light is hardly scattered twice, as in {object_names(thin)}, up to 15 % too dark"
+            text += f"; where light is hardly scattered twice, as in {object_names(thin)}, up to 20 % wrong"
+            if ground is not None and any(map(_scatters_ahead, thin)):
+                text += f", because not {ground.ground.mesh.name!r} but the environment is scattered forward"
         if scene.lights:
             text += (
                 "; where lights shine from behind, bodies are up to 30 % too dark, and rims up to 40 % too bright "
@@ -390,19 +393,22 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
             inside = any(may_hold(other, body) for other in rest for body in without)
             where = "up to 30 % too dark in, and up to 10 % next to" if inside else "up to 10 % too dark next to"
             text += f"; {where} {object_names(rest)}, whose light does not reach these bodies"
-        ahead = [body.medium is not None and body.medium.anisotropy >= STRONGLY_AHEAD for body in bodies]
-        if any(ahead) and scene.environment.kind == "image":
+        if any(map(_scatters_ahead, bodies)) and scene.environment.kind == "image":
             text += "; bright parts of the environment, scattered forward by the bodies, are up to 10 % wrong"
         if any(body.medium is not None and body.medium.emits for body in bodies):
             text += "; light that the bodies emit and scatter is up to 10 % too dark"
         if held := [item for item in scene.opaque if any(may_hold(body, item) for body in bodies)]:
             text += f"; the light around {object_names(held)} inside the bodies is wrong by up to 25 %"
-        ground = ground_below(scene, [i for i, body in enumerate(scene.objects) if body in bodies])
         beside = [item for item in scene.opaque if not any(may_hold(body, item) for body in bodies)]
         if others := [item for item in beside if ground is None or item is not ground.ground]:
             text += f"; light from these bodies does not reach {object_names(others)}: up to 10 % too dark there"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     return notes
+
+
+def _scatters_ahead(body: Object) -> bool:
+    medium = scatterer_of(body)
+    return medium is not None and medium.anisotropy >= STRONGLY_AHEAD
 
 
 def _is_thin(body: Object) -> bool:
