@@ -1,7 +1,7 @@
 """Specks in pictures of media: isolated pixels far off their neighbors, over presets, meshes and stages.
 
     python tools/find_specks.py
-    python tools/find_specks.py --presets jade,soap --meshes cube,spike --every --out out/specks
+    python tools/find_specks.py --presets jade,soap --meshes cube,bunny.obj --every --orbit 30 --out out/specks
 
 A pixel is isolated if it is brighter than each of its eight neighbors, or darker, by half as much as it is off their
 median, and that is more than four times the spread of the 24 around it: lines, edges, corners and flanks of highlights
@@ -103,20 +103,25 @@ def main() -> None:
     """Render, and count."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--presets", default=",".join(tl.presets()))
-    parser.add_argument("--meshes", default="smooth,cube,thin,spike,hollow,coarse", help="also: fine, 90,000 triangles")
+    parser.add_argument(
+        "--meshes", default="smooth,cube,thin,spike,hollow,coarse", help="also: files, and fine, 90,000 triangles"
+    )
     parser.add_argument("--stages", default="night,studio,daylight", help="none: bodies in the air")
     parser.add_argument("--every", action="store_true", help="show all pairs on every stage, not on one stage in turn")
+    parser.add_argument("--orbit", type=float, default=0.0, help="degrees by which bodies are turned about +Y")
     parser.add_argument("--width", type=int, default=96)
     parser.add_argument("--samples", type=int, default=16)
     parser.add_argument("--size", type=float, default=0.06, help="longest side of the bodies in metres")
     parser.add_argument("--out", type=Path, default=None, help="folder for pictures with specks")
     options = parser.parse_args()
     size, pictures, totals = (options.width, options.width * 3 // 4), 0, np.zeros(2, int)
+    cosine, sine = np.cos(np.radians(options.orbit)), np.sin(np.radians(options.orbit))
+    turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
     with tl.Renderer() as renderer:
         for i, shape in enumerate(options.meshes.split(",")):
-            mesh = MESHES[shape]()
+            mesh = MESHES[shape]() if shape in MESHES else tl.load_mesh(shape, unit="m")
             extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
-            mesh = tl.Mesh(mesh.vertices * (options.size / extent), mesh.faces)
+            mesh = tl.Mesh(mesh.vertices @ turn.T * (options.size / extent), mesh.faces)
             for (j, name), (k, stage) in product(*map(_numbered, (options.presets, options.stages))):
                 if not options.every and (i + j + k) % len(options.stages.split(",")):
                     continue
@@ -134,7 +139,7 @@ def main() -> None:
                 print(f"{shape} {stage} {name}: {found.sum()} isolated pixels, specks: {places}", flush=True)
                 if options.out is not None:
                     options.out.mkdir(parents=True, exist_ok=True)
-                    frame.save(options.out / f"{shape}-{stage}-{name}.png")
+                    frame.save(options.out / f"{Path(shape).stem}-{stage}-{name}.png")
     print(f"{totals[0]} specks in {pictures} pictures, and {totals[1]} isolated pixels of the scenes")
 
 
