@@ -157,8 +157,9 @@ def _ice_in_a_drink() -> tl.Scene:
 
 def _wax_on_a_ground() -> tl.Scene:
     body = tl.Object(mesh("bear"), WAX, placed(3.0, turn=-18.0))
-    sun = tl.DirectionalLight((-0.5, -0.7, -0.45), 2.0)
-    return viewed([body, ground(0.4, (0.8, 0.78, 0.75))], 0.06, 0.025, [sun], DAY)
+    # Of a light with a size, random paths find what the interface refracts.
+    lamp = tl.SphereLight.from_radiance((0.25, 0.35, 0.23), (15.0, 15.0, 15.0), 0.1)
+    return viewed([body, ground(0.4, (0.8, 0.78, 0.75))], 0.06, 0.025, [lamp], DIM)
 
 
 def _matched_wax_on_a_ground() -> tl.Scene:
