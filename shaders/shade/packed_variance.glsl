@@ -1,15 +1,4 @@
-// What a sample averages highlights over, and a symmetric matrix of two rows as a picture stores it in one number.
-
-uniform float filter_area;  // squared alpha of the filter of one sample, in pixels
-
-// Filter of the highlights of a sample. All zero: none.
-struct SampleFilter {
-    vec3 normals;  // squared alpha of the normals within it, as a symmetric matrix (xx, xy, yy) in `projection`
-    float width;   // alpha in metres across the ray
-    float turn;    // alpha of the directions of rays, in radians
-};
-
-const SampleFilter NO_FILTER = SampleFilter(vec3(0.0), 0.0, 0.0);
+// A symmetric matrix of two rows, as a picture stores it in one number: see normal_variance.glsl.
 
 const float LEAST_PACKED = 24.0;  // octaves below 1
 

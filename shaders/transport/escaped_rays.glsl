@@ -37,6 +37,11 @@ struct EscapedRay {
     Ellipse ellipse;
 };
 
+// Metres across a pixel, at a distance from the eye.
+float pixel_metres(float away) {
+    return 2.0 * length(surface_up.xyz) * (surface_right.w == 1.0 ? away : 1.0) / frame_size.y;
+}
+
 // Unit vector from the eye to a point.
 vec3 direction_from_eye(vec3 point) {
     return surface_right.w == 1.0 ? normalize(point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz) : ray_forward.xyz;

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -66,15 +65,6 @@ from translucent.planning.render_plan import RenderPlan
 from translucent.scene.backdrop import Backdrop
 from translucent.scene.camera import Camera, Window
 from translucent.scene.grounds import Mirror, mirror_of
-
-#: Samples with photons, in frames of so many samples at least: drawing what they land on takes a fifth of a sample's
-#: time. Of the Sobol points the second four lie in the four quarters of a pixel, and their mean in its middle.
-ROUNDS, ROUNDS_FROM = range(4, 8), 8
-
-#: Squared alpha, in pixels, of the filter of one sample in the middle of each pixel, which finds the light of a smaller
-#: light with a standard error of 4 %. So do several at low-discrepancy points, at most 5 %, if their filters have four
-#: times their area.
-PIXEL_FILTER, FILTER_OVERLAP = 2.0 / math.pi, 4.0
 
 #: Faces of an object from which on it takes longer to draw all than to choose those over some pixels.
 MANY_FACES = 1 << 12
@@ -393,11 +383,6 @@ class FrameJob(CameraView):
         table = self._packed[1]
         return self.gl.texture(table.shape[1::-1], 4, table, dtype="f4")
 
-    @property
-    def opaque_samples(self) -> int:
-        """Number of samples in which opaque objects are shaded."""
-        return len(ROUNDS) if self.few_opaque else self.samples
-
     def place(self, shift: tuple[float, float], *, with_depth: bool = False) -> None:
         """Write the uniforms for samples that are `shift` (right, down) pixels off the pixel centers."""
         scene = self.scene
@@ -521,11 +506,6 @@ class FrameJob(CameraView):
             self.resources.grids.use(unit, scene_grids(self.scene, self.features.slots))
         if self.features.scatters_again and self.diffused_light is not None:
             self.diffused_light.texture.use(light_unit)
-
-
-def filter_area(samples: int) -> float:
-    """Squared alpha, in pixels, of the filter of the highlights of one of so many samples of a pixel."""
-    return PIXEL_FILTER * min(FILTER_OVERLAP / samples, 1.0)
 
 
 def _contents(

@@ -7,7 +7,7 @@ import numpy as np
 
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.context import require_interfaces
-from translucent.gpu.job import FrameJob, filter_area
+from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.opaque import bind_light, interface_shadow_switches
 from translucent.gpu.passes.variants import Variants, background_switches, coat_switches, look_switches
 from translucent.gpu.placement import Part
@@ -74,7 +74,7 @@ class InterfacesPass:
                 job.resources.textures.bind(surface, program, len(_DRAWN_SAMPLERS))
                 set_uniform(program, "surface_color", (*np.asarray(surface.color), surface.transmission))
                 set_uniform(program, "surface_roughness", surface.roughness)
-                set_used(program, {"filter_area": filter_area(1 if job.enlarged else job.samples)})
+                set_used(program, {"sample_area": 1.0 if job.enlarged else 1.0 / job.samples})
                 held = program, surface
             if holes:
                 set_uniform(program, "hole_below", surface.alpha_cutoff)
@@ -198,7 +198,6 @@ class SurfacesPass:
             **coat_switches(job.scene.bodies),
             DIFFUSED=job.diffused_light is not None,
         )
-        set_used(program, {"filter_area": filter_area(job.samples)})
         self._variants.draw_covered(job, program, framebuffer, top_first=True)
         gl.enable_only(blending)
         table.release()

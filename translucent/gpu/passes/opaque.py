@@ -15,7 +15,7 @@ import numpy as np
 
 from translucent.gpu.constants import CONSTANTS
 from translucent.gpu.context import require_interfaces
-from translucent.gpu.job import CameraView, FrameJob, TextureBackdrop, filter_area
+from translucent.gpu.job import CameraView, FrameJob, TextureBackdrop
 from translucent.gpu.passes.variants import Variants, coat_switches, look_switches
 from translucent.gpu.resources import Resources
 from translucent.gpu.shaders import set_uniform, set_used
@@ -117,8 +117,7 @@ class OpaquePass:
                 program = self._surfaced.program(SURFACE=1, **switches, **looks)
                 self._surfaced.bind(**job.resources.light_textures(environment))
                 set_surface(job, program, surface, surface.alpha_cutoff)
-                samples = job.opaque_samples
-                set_used(program, {"texture_bias": -0.5 * math.log2(samples), "filter_area": filter_area(samples)})
+                set_used(program, {"texture_bias": -0.5 * math.log2(job.samples), "sample_area": 1.0 / job.samples})
             if ground is not None and mapped:
                 ground.texture.use(self._plain.units["ground_shadows"])
                 set_used(program, {"ground_rows": ground.rows, "mapped_ground": ground.plane})
@@ -357,7 +356,7 @@ class LayersPass:
             **coat_switches([body]),
         )
         set_surface(job, program, surface, surface.alpha_cutoff or (LEAST_COVER if body.covers else 0.0))
-        set_used(program, {"filter_area": filter_area(job.samples)})
+        set_used(program, {"sample_area": 1.0 / job.samples})
         if body.covers:
             set_uniform(program, "layer_opacity", surface.opacity)
         # The far side first, as in viewers of glTF; a sheet that emits does so on both sides.

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.formulas.sampling import FOOTPRINT_STEP, MOST_POINTS, sobol_points
-from translucent.gpu.constants import ENLARGED_ACROSS, PIXEL_PARTS
+from translucent.gpu.constants import ENLARGED_ACROSS
 from translucent.gpu.context import require_interfaces
-from translucent.gpu.job import FrameJob, filter_area
+from translucent.gpu.job import FrameJob
 from translucent.gpu.passes.interfaces import NoInterface
 from translucent.gpu.passes.opaque import bind_light, interface_shadow_switches
 from translucent.gpu.passes.ray_generations import Pixels, RayGenerations, all_words
@@ -125,7 +125,6 @@ class TracedInterfacesPass:
             **({"microfacet_points": microfacet_points(job.sample)} if switches["MICROFACETS"] else {}),
             "blurred_fraction": 0.0 if job.plan.request.denoise else blurred_fraction(job.samples),
             "sample_width": job.samples**-0.5,
-            "filter_area": filter_area(job.samples) if job.enlarged is None else filter_area(1) / PIXEL_PARTS**2,
             "picture_first": int(_shows_more(job)),
             **scene_values,
             **_ground(job.scene),
