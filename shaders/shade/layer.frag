@@ -57,7 +57,7 @@ void main() {
     float facing = dot(normal, ray);
     normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;
     float coverage = layer_opacity * surface.opacity;
-    vec4 covering = vec4(coverage * min(opaque_radiance_of(surface, normal, ray, from_center, vec3(-1.0), ray), vec3(NOTHING)), coverage);
+    vec4 covering = vec4(coverage * min(opaque_radiance_of(surface, normal, ray, from_center), vec3(NOTHING)), coverage);
 #if BODIES
     if (axial_depth > texelFetch(fronts, ivec2(gl_FragCoord.xy), 0).r + touching) {
         behind = covering;

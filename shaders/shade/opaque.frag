@@ -80,7 +80,7 @@ void main() {
     float facing = dot(normal, ray);
     normal = facing > -1e-3 ? normalize(normal - (facing + 1e-3) * ray) : normal;
     surface.map = own_map();
-    vec3 light = opaque_radiance_of(surface, normal, ray, from_center, vec3(-1.0), ray);
+    vec3 light = opaque_radiance_of(surface, normal, ray, from_center);
 #else
     vec3 normal = normalize(world_normal);
     vec3 light = diffuse_radiance(dot(normal, ray) > 0.0 ? -normal : normal);

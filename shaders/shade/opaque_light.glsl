@@ -96,57 +96,37 @@ vec3 opaque_value(OpaqueBsdf bsdf, vec3 normal, vec3 ray, LightSample arriving, 
     return value;
 }
 
-// Light of the environment that it mirrors; direction: of the mirror image.
-vec3 mirrored_light(OpaqueSurface surface, OpaqueBsdf bsdf, vec3 direction) {
-    vec3 sum = mix(bsdf.dielectric.albedo, bsdf.metal.albedo, bsdf.metallic) * environment_light(direction, surface.roughness);
-#if CLEAR_COAT
-    sum = (1.0 - bsdf.coated) * sum + bsdf.coated * environment_light(direction, surface.clearcoat.y);
-#endif
-    return surface.unoccluded * sum;
-}
-
-// Light of the environment that the base reflects, and lets pass.
-vec3 base_light(OpaqueSurface surface, OpaqueBsdf bsdf, vec3 normal, vec3 point) {
-    vec3 sum = vec3(0.0);
+// Light of the environment; direction: of the mirror image.
+vec3 opaque_environment(OpaqueSurface surface, OpaqueBsdf bsdf, vec3 normal, vec3 direction, vec3 point) {
+    vec3 sum = surface.unoccluded * mix(bsdf.dielectric.albedo, bsdf.metal.albedo, bsdf.metallic) * environment_light(direction, surface.roughness);
     // One after the other in a loop: compilers then inline the shadows of the environment once.
     float last = surface.passed == vec3(0.0) ? 1.0 : -1.0;
     for (float side = 1.0; side >= last; side -= 2.0) {
-        vec3 albedo = side > 0.0 ? bsdf.base : bsdf.passed;
+        vec3 albedo = surface.unoccluded * (side > 0.0 ? bsdf.base : bsdf.passed);
         sum += albedo * surrounding_irradiance(surface.map, point, side * normal) / PI;
     }
-    return (1.0 - bsdf.coated) * surface.unoccluded * sum;
+#if CLEAR_COAT
+    sum = (1.0 - bsdf.coated) * sum + surface.unoccluded * bsdf.coated * environment_light(direction, surface.clearcoat.y);
+#endif
+    return sum;
 }
 
-// Radiance along a ray. Where `known` is that along another ray, only what depends on the direction is exchanged: what the surface
-// mirrors, and the fraction that comes from below it. Negative: it is unknown.
-// ray, known_ray: unit, from the eye; normal: to the eye's side; point: from the center of the media.
-vec3 opaque_radiance_of(OpaqueSurface surface, vec3 normal, vec3 ray, vec3 point, vec3 known, vec3 known_ray) {
-    bool is_known = known.r >= 0.0;
-    float cos_view = clamp(-dot(normal, ray), 1e-3, 1.0), cos_known = clamp(-dot(normal, known_ray), 1e-3, 1.0);
-    OpaqueBsdf bsdf = opaque_bsdf(surface, cos_view), known_bsdf = bsdf;
-    vec3 emitted = (1.0 - bsdf.coated) * surface.emitted, below = vec3(1.0);
-    vec3 sum = emitted + mirrored_light(surface, bsdf, reflected_direction(ray, normal));
-    if (is_known) {
-        known_bsdf = opaque_bsdf(surface, cos_known);
-        below = (1.0 - bsdf.dielectric.albedo) / max(1.0 - known_bsdf.dielectric.albedo, 1e-2);
-        below *= (1.0 - bsdf.coated) / max(1.0 - known_bsdf.coated, 1e-2);
-        vec3 exchanged = (1.0 - known_bsdf.coated) * surface.emitted + mirrored_light(surface, known_bsdf, reflected_direction(known_ray, normal));
-        sum += below * (known - exchanged);
-    } else {
-        sum += base_light(surface, bsdf, normal, point);
-    }
-    if (is_known || surface.map.lit > 0.0) { bsdf.base = bsdf.passed = known_bsdf.base = vec3(0.0); }  // lights are left to mirror
+// ray: unit, from the eye; normal: to the eye's side; point: from the center of the media.
+vec3 opaque_radiance_of(OpaqueSurface surface, vec3 normal, vec3 ray, vec3 point) {
+    float cos_view = clamp(-dot(normal, ray), 1e-3, 1.0);
+    OpaqueBsdf bsdf = opaque_bsdf(surface, cos_view);
+    vec3 sum = opaque_environment(surface, bsdf, normal, reflected_direction(ray, normal), point);
+    if (surface.map.lit > 0.0) { bsdf.base = bsdf.passed = vec3(0.0); }  // lights are left to mirror
     for (int light = 0; light < light_count; ++light) {
         LightSample arriving = light_at(light, point);
         float cos_light = dot(normal, arriving.towards);
-        vec3 value = (bsdf.coated - 1.0) * bsdf.passed / PI * min(cos_light, 0.0);
+        vec3 irradiance = arriving.irradiance;
+        if (cos_light > 0.0 || surface.passed_share > 0.0) { irradiance *= light_reaching(light, point, normal); }
         if (cos_light > 0.0) {
-            value += opaque_value(bsdf, normal, ray, arriving, cos_view, cos_light);
-            if (is_known) { value -= below * opaque_value(known_bsdf, normal, known_ray, arriving, cos_known, cos_light); }
+            sum += opaque_value(bsdf, normal, ray, arriving, cos_view, cos_light) * irradiance;
+        } else {
+            sum -= (1.0 - bsdf.coated) * bsdf.passed / PI * cos_light * irradiance;
         }
-        value *= arriving.irradiance;
-        if (any(greaterThan(abs(value), is_known ? LEAST_SHADOWED * known : vec3(0.0)))) { value *= light_reaching(light, point, normal); }
-        sum += value;
     }
-    return sum;
+    return sum + (1.0 - bsdf.coated) * surface.emitted;
 }

@@ -42,11 +42,6 @@ float pixel_metres(float away) {
     return 2.0 * length(surface_up.xyz) * (surface_right.w == 1.0 ? away : 1.0) / frame_size.y;
 }
 
-// Unit vector from the eye to a point.
-vec3 direction_from_eye(vec3 point) {
-    return surface_right.w == 1.0 ? normalize(point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz) : ray_forward.xyz;
-}
-
 #if OPAQUE
 uniform int picture_first;  // 1: the picture has light of opaque objects that rays do not find
 
@@ -90,17 +85,17 @@ bool environment_in_footprint(EscapedRay end, out vec3 light) {
 }
 
 #if OPAQUE
-// The picture shows an object as the eye sees it: what depends on the direction is exchanged, but where rough interfaces blur it.
 vec3 radiance_of_opaque(EscapedRay end) {
     vec3 light;
     bool has_textures = picture_first == 0 && reads_all_textures(end.object);
     bool has_light = traced_body(end.object).diffuses > 0.5;  // photons in the picture would count twice
-    bool shades = has_light || (has_textures && end.triangle >= 0 && end.blur == 0.0);
-    if (shades || !opaque_in_picture(end, light)) { light = vec3(-1.0); }
-    ObjectRow body = traced_body(end.object);
-    if (end.triangle >= 0) { body = body_at(end.object, end.triangle, end.weights, end.width); }
-    vec3 from_eye = end.blur > 0.0 ? end.direction : direction_from_eye(end.point);
-    return max(opaque_light(body, end.normal, end.direction, end.point, light, from_eye), 0.0);
+    bool is_known = has_light || (has_textures && end.triangle >= 0 && end.blur == 0.0);
+    if (is_known || !opaque_in_picture(end, light)) {
+        ObjectRow body = traced_body(end.object);
+        if (end.triangle >= 0) { body = body_at(end.object, end.triangle, end.weights, end.width); }
+        light = opaque_light(body, end.normal, end.direction, end.point);
+    }
+    return light;
 }
 #endif
 

@@ -9,7 +9,7 @@ OpaqueSurface opaque_surface(ObjectRow body, vec3 normal, vec3 point) {
         normal, vec3(0.0), 1.0, 1.0, false, body.film, vec2(body.clearcoat, body.clearcoat_roughness), map);
 }
 
-// Radiance of an opaque object along a ray, lit as where it is visible directly; `known` along `known_ray`, negative: unknown.
-vec3 opaque_light(ObjectRow body, vec3 normal, vec3 direction, vec3 point, vec3 known, vec3 known_ray) {
-    return opaque_radiance_of(opaque_surface(body, normal, point), normal, direction, point, known, known_ray);
+// Radiance of an opaque object along a ray, lit as where it is visible directly.
+vec3 opaque_light(ObjectRow body, vec3 normal, vec3 direction, vec3 point) {
+    return opaque_radiance_of(opaque_surface(body, normal, point), normal, direction, point);
 }

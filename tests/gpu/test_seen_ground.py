@@ -14,10 +14,10 @@ SIDE, PART = 32, 4
 BALL = Sphere().tessellate(24)
 
 
-def staged(ior: float, height: float, stage: str = "studio") -> tl.Scene:
+def staged(ior: float, height: float) -> tl.Scene:
     camera = tl.Camera.look_at((0.0, height, 6.0), (0.0, 0.0, 0.0), fov_y=24.0)
     body = tl.Object(BALL, tl.Medium(ior=ior), surface=tl.Surface())
-    return tl.staged(tl.Scene([body], camera, environment_shadows=1), stage)
+    return tl.staged(tl.Scene([body], camera, environment_shadows=1))
 
 
 @pytest.mark.parametrize(("height", "depth"), [(0.15, 12), (2.0, 12), (2.0, 1)])
@@ -44,34 +44,3 @@ def test_a_mirror_image_of_the_ground_does_not_depend_on_the_picture(renderer: t
     off = np.abs(middle - alone).max(axis=-1) / alone.mean()
     print(f"median {np.median(off):.1e}, mean {off.mean():.1e}")
     assert off.mean() < 2e-2
-
-
-SUN = tl.DirectionalLight((0.2, -1.0, 1.0), (1.0, 1.0, 1.0))
-
-
-@pytest.mark.parametrize("coat", [0.0, 0.5])
-@pytest.mark.parametrize("lights", [(), (SUN,)], ids=["sky", "sun"])
-def test_a_ground_mirrors_along_the_rays_that_see_it(
-    renderer: tl.Renderer, lights: tuple[tl.DirectionalLight, ...], coat: float
-) -> None:
-    """A plain ground is looked up in the picture, which has what the ground mirrors towards the eye.
-
-    Rays shade a ground with a texture themselves, and a texture of one color leaves it as it is. The nearest pixel is
-    half a pixel away, at most.
-    """
-    scene = dataclasses.replace(staged(1.5, 2.0, "night"), lights=lights, environment_shadows=0)
-    ball, floor = scene.objects
-    white = tl.Texture(np.ones((1, 1, 3), np.float32))
-    plain = tl.Surface(0.15, (0.05, 0.05, 0.05), clearcoat=coat, clearcoat_roughness=0.2, emissive=(coat, coat, coat))
-    frames = []
-    for surface in (plain, dataclasses.replace(plain, color_texture=white)):
-        shown = dataclasses.replace(scene, objects=(ball, dataclasses.replace(floor, surface=surface)))
-        frames.append(renderer.render(shown, (SIDE, SIDE), samples=1, caustics=tl.Caustics(0)))
-    seen, shaded = frames
-    off = np.abs(seen.radiance - shaded.radiance)[seen.coverage].mean()
-    beside = ~(seen.coverage[1:] | seen.coverage[:-1])
-    half_pixel = 0.5 * np.abs(np.diff(shaded.radiance, axis=0))[beside].mean()
-    print(
-        f"{off:.1e} off, half a pixel of the ground {half_pixel:.1e}, mean {shaded.radiance[seen.coverage].mean():.1e}"
-    )
-    assert off < half_pixel

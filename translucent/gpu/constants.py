@@ -126,7 +126,6 @@ CONSTANTS: dict[str, str] = {
     "STEEP_IN_LIGHT_VIEW": "5e-3",  # axial depth per texel, from which on a face may well curve within a texel
     "SHADOW_MARGIN": "1.0",  # texels that a surface may be behind what is opaque in a map of shadows, and still is lit
     "STEEPEST_SHADOW": "64.0",  # texels along a light's rays that a surface may rise from one texel to the next
-    "LEAST_SHADOWED": "0.017",  # step of a picture with 8 bits in the middle of its range, as a fraction of the light
     **{f"MARCH_{rule.upper()}": str(i) for i, rule in enumerate(get_args(Quadrature))},
     "LEAST_SEEN": repr(LEAST_SEEN),
     "AHEAD_DEPTHS": f"{DEPTHS}.0",
