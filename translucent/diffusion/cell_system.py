@@ -2,17 +2,17 @@
 
 References
 ----------
-Hestenes & Stiefel 1952, "Methods of conjugate gradients for solving linear systems"; Nicolaides 1987, "Deflation of
-conjugate gradients with applications to boundary value problems"; Fischer 1998, "Projection techniques for iterative
-solution of Ax = b with successive right-hand sides".
+Nicolaides 1987, "Deflation of conjugate gradients with applications to boundary value problems"; Fischer 1998,
+"Projection techniques for iterative solution of Ax = b with successive right-hand sides".
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from itertools import count
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, cg
 
 from translucent.arrays import Array
 from translucent.diffusion.grid import BodyGrid
@@ -89,6 +89,8 @@ class CellSystem:
     def __init__(self, grid: BodyGrid, d: Array, absorbed: Array, lost: Array) -> None:
         pattern, values = grid.pattern, _balance(grid, d, absorbed, lost)
         self._matrix = sparse.csr_array((values, pattern.columns, pattern.starts), (grid.count, grid.count))
+        # SciPy makes columns of vectors before it multiplies a matrix by them.
+        self._operator = LinearOperator(self._matrix.shape, self._matrix.__matmul__, dtype=np.float64)
         self._approximate_inverse = _approximate_inverse(grid, self._matrix)
         self._known = KnownSolutions(self._matrix)
         self._taken = float(absorbed.sum() + lost.sum())
@@ -120,32 +122,26 @@ class CellSystem:
         self._known = KnownSolutions(self._matrix)
 
     def _found(self, right_side: Array, near: Array, tolerance: float) -> tuple[Array, int]:
-        """Preconditioned conjugate gradients; those of SciPy call three times as many functions in each step."""
-        least = tolerance * float(np.linalg.norm(right_side))
-        if least == 0.0:
-            return np.zeros_like(near), 0
-        found, rest = near.copy(), right_side - self._matrix @ near
-        direction, before = np.zeros_like(found), 1.0
-        for steps in range(MOST_STEPS):
-            if float(np.linalg.norm(rest)) <= least:
-                return found, steps
-            towards = self._approximate_inverse(rest)
-            now = float(rest @ towards)
-            direction *= now / before
-            direction += towards
-            pushed = self._matrix @ direction
-            length = now / float(direction @ pushed)
-            found += length * direction
-            rest -= length * pushed
-            before = now
-        raise RenderError(
-            "diffusion in a body",
-            f"the diffusion solver has not converged after {MOST_STEPS} steps in {len(right_side)} cells",
-            "render with scattering=tl.ScatteringLayer()",
+        steps = count()
+        found, failed = cg(
+            self._operator,
+            right_side,
+            near,
+            rtol=tolerance,
+            maxiter=MOST_STEPS,
+            M=self._approximate_inverse,
+            callback=lambda _: next(steps),
         )
+        if failed:
+            raise RenderError(
+                "diffusion in a body",
+                f"the diffusion solver has not converged after {MOST_STEPS} steps in {len(right_side)} cells",
+                "render with scattering=tl.ScatteringLayer()",
+            )
+        return found, next(steps)
 
 
-def _approximate_inverse(grid: BodyGrid, matrix: sparse.csr_array) -> Callable[[Array], Array]:
+def _approximate_inverse(grid: BodyGrid, matrix: sparse.csr_array) -> LinearOperator:
     """Preconditioner of a system: its diagonal, and a coarse correction that is constant in each block of cells.
 
     Errors that single cells see vanish in a few steps of conjugate gradients, and those as wide as the body in many:
@@ -163,7 +159,7 @@ def _approximate_inverse(grid: BodyGrid, matrix: sparse.csr_array) -> Callable[[
         size = np.abs(sums).max(initial=tiny)
         return np.asarray(diagonal * right_side + ((unit * size) * (coarse @ (sums / size).astype(np.float32)))[of])
 
-    return apply
+    return LinearOperator(matrix.shape, apply, dtype=np.float64)
 
 
 def _balance(grid: BodyGrid, d: Array, absorbed: Array, lost: Array) -> Array:
