@@ -217,8 +217,8 @@ def test_isolated_pixels_are_found_and_edges_are_not() -> None:
     found = {(int(row), int(column)) for row, column in np.argwhere(isolated_pixels(level, inside))}
     assert found == {(4, 5), (15, 8), (12, 25)}
     errors = np.full(level.shape, np.inf)
-    errors[4, 5] = 0.04  # of 0.3, half of which is more than three errors
-    errors[15, 8] = 0.04  # of 0.2
+    # Half of what the first pixel is off, 0.3, is more than three errors. Half of 0.2 is less.
+    errors[4, 5] = errors[15, 8] = 0.04
     assert isolated_pixels(level, inside, errors)[4, 5] == 0.0
     assert (isolated_pixels(level, inside, errors) > 0.0).sum() == 2
 
@@ -304,7 +304,7 @@ def test_isolated_pixels_are_right(renderer: tl.Renderer, monkeypatch: pytest.Mo
 
 
 def test_bubbles_smaller_than_a_pixel_take_more_blocks(renderer: tl.Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """64 samples of a pixel, a few of which see a bubble, are farther from a finer picture than more blocks."""
+    """Few of the 64 samples of a pixel see a bubble: more blocks bring it nearer to a finer picture."""
     ice, (width, height) = Box((-0.03,) * 3, (0.03,) * 3).tessellate(), (64, 48)
     scene = showcase(ice, "ice", (width, height), environment=STAGES["studio"].environment())
     finer = renderer.render(scene, (4 * width, 4 * height), samples=16).radiance
