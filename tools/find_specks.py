@@ -149,4 +149,7 @@ def _numbered(names: str) -> list[tuple[int, str]]:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except tl.InputError as error:
+        raise SystemExit(f"error: {error}") from None

@@ -94,8 +94,14 @@ def main() -> None:
     parser.add_argument("--noise", type=float, default=0.01)
     parser.add_argument("--seconds", type=float, default=600.0)
     chosen = parser.parse_args()
+    if not (chosen.folder / "scenes.py").is_file():
+        parser.error(f"{chosen.folder} holds no scenes.py; copy one, as tools/transport/scenes.py, into this folder")
     sys.path.insert(0, str(chosen.folder))
     scenes = import_module("scenes")
+    if unknown := set(chosen.names) - set(scenes.SCENES):
+        parser.error(
+            f"{chosen.folder}/scenes.py has no scene {', '.join(sorted(unknown))}; it has {', '.join(scenes.SCENES)}"
+        )
     with tl.Renderer() as renderer:
         for name in chosen.names or scenes.SCENES:
             target = chosen.folder / f"{name}.npz"
