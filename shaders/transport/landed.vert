@@ -6,6 +6,9 @@
 // photon takes there is its footprint (photon differentials, Schjoeth et al. 2007, "Photon differentials"; Frisvad et al. 2014,
 // "Photon differential splatting for rendering caustics"), here from differences to photons that start beside it. Of the two
 // that start on opposite sides, the nearer one counts, as the other may have taken another path.
+//
+// Pixels count photons in all of their area. So their squares stay where they are, wherever a sample is taken in them:
+// counted in squares around the points of several samples, a focus would be blurred by one more pixel.
 
 #include <constants>
 #include <View>
@@ -17,6 +20,7 @@ uniform sampler2D landed_power;
 uniform sampler2D landed_normal;       // of the face, unit, to the side on which it lies
 uniform sampler2D opaque_axial_depth;
 uniform int landed_count;
+uniform vec2 counted_around;  // middle of the squares in which photons are counted, from the centers of pixels
 uniform ivec2 beside;     // differences of number between photons that start side by side, in two directions
 uniform float footprint;  // area of some photons, as a fraction of the parallelogram to these two neighbors
 
@@ -97,7 +101,7 @@ void main() {
     vec4 point = texelFetch(landed_point, place, 0);
     if (point.w != 1.0) { return; }
     vec3 normal = texelFetch(landed_normal, place, 0).xyz;
-    vec2 projected = picture_position(point.xyz).xy - frame_size.zw;
+    vec2 projected = picture_position(point.xyz).xy - counted_around;
     vec2 corner = floor(projected);
     if (!is_inside(corner)) { return; }
 

@@ -261,6 +261,9 @@ class FrameJob(CameraView):
     photon_light : tuple, optional
         Light of photons on opaque objects: a texture of the pixels of a larger picture, the number of them to each
         pixel of the frame along a side, and which of those these are, right and down.
+    pixel_middle : (float, float)
+        Middle of what a pixel is to show, right and down from its center: of a frame that shows one of several pixels
+        of a larger picture.
     report : callable
         Takes the fraction of the frame's samples, or random paths, that is done, now and then.
     corner : (int, int)
@@ -308,6 +311,7 @@ class FrameJob(CameraView):
     uneven: Part | None = None
     enlarged: list[tuple[float, float]] | None = None
     photon_light: tuple[moderngl.Texture, int, tuple[int, int]] | None = None
+    pixel_middle = (0.0, 0.0)
 
     def __init__(
         self,

@@ -328,7 +328,9 @@ class Viewport:
         if photons is not None:
             job.photon_light = photons, stride, phase
         try:
-            job.place(((phase[0] + 0.5 + right) / stride - 0.5, (phase[1] + 0.5 + down) / stride - 0.5))
+            middle = (phase[0] + 0.5) / stride - 0.5, (phase[1] + 0.5) / stride - 0.5
+            job.pixel_middle = middle
+            job.place((middle[0] + right / stride, middle[1] + down / stride))
             self._make_ready(job, chosen, first=round_ == 0)
             engine.run(job)
             self._add(job, chosen, (phase[0] * size[0], phase[1] * size[1]), first=round_ == 0)

@@ -186,7 +186,7 @@ class CausticsPass:
         landed_on = dict(zip(_LANDED, landed.color_attachments, strict=True))
         self._splat.bind(**landed_on, opaque_axial_depth=job.targets["opaque"].color_attachments[0])
         job.targets["photons"].use()
-        set_uniform(program, "landed_count", count)
+        set_used(program, {"landed_count": count, "counted_around": job.pixel_middle})
         add_up(self._gl, moderngl.PROGRAM_POINT_SIZE)
         self._splat.draw_points(program, count)
 
