@@ -84,15 +84,17 @@ def test_a_body_in_another_one_does_not_receive_its_light_twice() -> None:
     assert may_light(shapes[0], shapes[1])
 
 
-def test_a_ground_lights_a_body_from_below() -> None:
-    """The underside of a small lossless ball high above a sunny ground shows the radiosity of the ground."""
+@pytest.mark.parametrize("left", [-40.0, 0.0])
+def test_a_ground_lights_a_body_from_below(left: float) -> None:
+    """The underside of a small lossless ball high above a sunny ground shows its radiosity; half above its edge."""
     light = tl.DirectionalLight((0, -1, 0), (1, 2, 3))
     ball = tl.Object(Sphere(radius=0.1).tessellate(24), tl.Medium(scattering=200.0))
-    scene = tl.Scene([ball, ground(0.5, -3.0)], CAMERA, [light], BLACK)
+    slab = tl.Object(Box((left, -4, -40), (40, -3, 40)).tessellate(), None, color=(0.5, 0.5, 0.5))
+    scene = tl.Scene([ball, slab], CAMERA, [light], BLACK)
     diffusing = solver(scene)
     below = diffusing.lit.grid.normals[:, 1] < -0.95
     found = diffusing.field(scene, 0).leaving[below].mean(axis=0)
-    np.testing.assert_allclose(found, 0.5 * np.array((1, 2, 3)), rtol=0.1)
+    np.testing.assert_allclose(found, (0.5 if left else 0.25) * np.array((1, 2, 3)), rtol=0.1)
 
 
 def test_the_light_of_a_ball_on_a_ground() -> None:
@@ -126,7 +128,7 @@ def test_the_light_of_a_glowing_ball_on_a_ground() -> None:
     """A ball that emits q V W/sr, and neither absorbs nor bends light, is like a point (Newton's shell theorem)."""
     ball = tl.Object(Sphere(radius=0.5).tessellate(64), tl.Medium(emission=(1, 2, 3)))
     glass = tl.Object(Sphere(radius=0.7).tessellate(64), tl.Medium(ior=1.4), priority=-1)
-    board = tl.Object(Box((0.2, -0.9, -4), (4, -0.85, 4)).tessellate(), None)
+    board = tl.Object(Box((0.7, -0.98, -4), (4, -0.93, 4)).tessellate(), None)
     hidden, bare = (plan(tl.Scene(objects, CAMERA)) for objects in ([ball, ground(), board], [ball, ground()]))
     assert bare.glowing == (0,)
     alone, beside = (FieldCache().of(one).ground for one in (bare, hidden))

@@ -303,7 +303,7 @@ def ground_map(
     total = emitted_irradiance(scene, glowing, points) if glowing else np.zeros(points.points.shape)
     for i, body in lit.items():
         others = [other.nearest for other in lit.values() if other is not body]
-        if body.casters.opaque is not None and len(scene.opaque) > 1:
+        if body.casters.opaque is not None and (len(scene.opaque) > 1 or ground.has_walls):
             others.append(lambda *rays, caster=body.casters.opaque.caster: caster.nearest(*rays)[::-1])
 
         def nearest(

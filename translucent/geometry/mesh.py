@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from translucent.arguments import checked, vectors
-from translucent.arrays import Array, Frozen
+from translucent.arrays import Array, Frozen, Integers
 from translucent.errors import InputError, TranslucentWarning
 from translucent.geometry.diagnosis import Diagnosis, diagnose
 from translucent.geometry.foreign import foreign_name, foreign_parts, unit_of
@@ -29,6 +29,12 @@ MAX_INDEX = 2**31 - 1
 MAX_COORDINATE = 1e18
 #: Smallest diagonal in metres whose square is not lost in float32.
 MIN_DIAGONAL = 1e-18
+
+#: Least part of a mesh's area that is called a plane.
+LEAST_PLANE = 1.0 / 256.0
+
+#: Steps of the normals of planes, and of their heights in radii of the mesh, up to 1: coarser than float32 rounds.
+PLANE_STEPS = 20_000
 
 #: Bytes of memory that welding, winding and diagnosing take at most for each triangle, with the mesh itself.
 PER_TRIANGLE = 150
@@ -182,6 +188,17 @@ class Mesh(Frozen):
     def face_normals(self) -> Array:
         """(m, 3): unit normals of the faces, towards the side from which they are counter-clockwise; 0 without area."""
         return unit_normals(self.vertices, self.faces)
+
+    @cached_property
+    def planes(self) -> tuple[Integers, ...]:
+        """Numbers of the faces in each plane that holds at least `LEAST_PLANE` of the area."""
+        first = self.vertices[self.faces[:, 0]]
+        height = np.einsum("ij,ij->i", first - self.center, self.face_normals) / self.radius
+        steps = np.rint(np.column_stack([self.face_normals, height]) * PLANE_STEPS).astype(np.int64) + PLANE_STEPS
+        _, group = np.unique(steps @ (2 * PLANE_STEPS + 1) ** np.arange(4), return_inverse=True)
+        across, along = (self.vertices[self.faces[:, i]] - first for i in (1, 2))
+        area = np.bincount(group, 0.5 * np.linalg.norm(np.cross(across, along), axis=1))
+        return tuple(np.flatnonzero(group == one) for one in np.flatnonzero(area >= LEAST_PLANE * self.area))
 
     @cached_property
     def vertex_normals(self) -> Array:

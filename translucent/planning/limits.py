@@ -237,7 +237,7 @@ def shadow_effects(scene: Scene) -> list[Note]:
     if not scene.environment_shadows and scene.environment.mean.any():
         shadowing = [i for i, item in enumerate(scene.objects) if treatment_of(item) is Treatment.DIFFUSION]
         ground = ground_below(scene, shadowing) if shadowing else None
-        if ground is None or len(scene.objects) > len(shadowing) + 1:
+        if ground is None or ground.has_walls or len(scene.objects) > len(shadowing) + 1:
             text = (
                 "the environment casts no shadows on opaque objects, so a ground is up to twice as bright beside "
                 "objects that stand on it"
@@ -310,13 +310,18 @@ def reflected_effects(
     emitting = [body for body in scene.bodies if body.medium is not None and body.medium.emits]
     silent = [body for body in emitting if treatment_of(body) is not Treatment.DIFFUSION]
     ground = ground_below(scene, glowing) if glowing else None
-    dark = [item for item in scene.opaque if ground is None or item is not ground.ground]
+    dark = _off_ground(scene.opaque, ground)
     if silent and dark:
         texts.append(
             f"{object_names(silent)}: the light that these media emit does not reach {object_names(dark)}: "
             "black there if nothing else shines; --method path-traced includes this light"
         )
     return [Note(NoteKind.REFLECTED_LIGHT, text) for text in texts]
+
+
+def _off_ground(items: Iterable[Object], ground: Mirror | None) -> list[Object]:
+    """Those of some opaque objects that are more than the ground below bodies, or something else."""
+    return [item for item in items if ground is None or item is not ground.ground or ground.has_walls]
 
 
 def _is_metal(item: Object) -> bool:
@@ -400,7 +405,7 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
         if held := [item for item in scene.opaque if any(may_hold(body, item) for body in bodies)]:
             text += f"; the light around {object_names(held)} inside the bodies is wrong by up to 25 %"
         beside = [item for item in scene.opaque if not any(may_hold(body, item) for body in bodies)]
-        if others := [item for item in beside if ground is None or item is not ground.ground]:
+        if others := _off_ground(beside, ground):
             text += f"; light from these bodies does not reach {object_names(others)}: up to 10 % too dark there"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     return notes
