@@ -17,7 +17,7 @@
 uniform uint aim;            // its number: a light, and a rectangle
 uniform uint round_begin;    // number of the first photon of this aim in one picture,
 uniform float round_photons; // and how many these are
-uniform vec2 aim_shift;      // where the sequence of starts begins
+uniform vec4 aim_shift;      // where the sequence of starts begins
 uniform vec4 light_from;     // position from the center of the media, w = 1; or direction of travel, w = 0
 uniform vec4 cone;           // in which a light shines
 uniform float light_radius;  // of the sphere that it is; 0 for a light without size
@@ -41,10 +41,19 @@ struct Photon {
     bool ends;
 };
 
-// An additive recurrence (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences").
-vec2 start_of(uint number) {
-    vec2 start = vec2(uvec2(number * 3242174889u, number * 2447445414u) >> 8u) / 16777216.0;
-    return fract(start + aim_shift);
+// Additive recurrences: where a photon is aimed at (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"), and
+// where on the disc of a light it begins, by the best of 1500 random pairs of steps: means of smooth functions of all four numbers
+// converge twice as fast as by roots of 2 and 3. Photons whose numbers differ by as much start as far apart in both.
+vec4 start_of(uint number) {
+    uvec4 word = number * uvec4(3242174889u, 2447445414u, 1188417451u, 3613785483u);
+    return fract(vec4(word >> 8u) / 16777216.0 + aim_shift);
+}
+
+// Point of the disc that a sphere of radius 1 looks like from a direction, by two numbers from 0 to 1.
+vec3 disc_point(vec3 direction, vec2 numbers) {
+    vec3 right = normalize(cross(direction, aim_up)), up = cross(right, direction);
+    float angle = 2.0 * PI * numbers.y;
+    return sqrt(numbers.x) * (cos(angle) * right + sin(angle) * up);
 }
 
 // Number from 0 to 1 that rises with the numbers of a picture's photons. Photons that take the same branches have numbers one after
@@ -65,15 +74,15 @@ int channel_of(uint number) {
 
 // A photon at the light, or where it comes near the scene; its power is that of its channel alone where indices differ.
 Photon begun(uint number, inout Draws draws, out vec3 power) {
-    vec2 start = start_of(number);
+    vec4 start = start_of(number);
     vec3 light_at = light_from.xyz;
-    if (light_radius > 0.0) { light_at += light_radius * sphere_point(random_numbers(draws).xyz); }
     Photon photon = Photon(light_at, 0.0, light_from.xyz, vec3(1.0), choice_of(number), light_interior, false, false);
     power = photon_power;
 #if DISPERSION
     power *= 3.0 * vec3(equal(ivec3(channel_of(number)), ivec3(0, 1, 2)));
 #endif
     if (aim_right == vec3(0.0)) {
+        if (light_radius > 0.0) { photon.origin += light_radius * sphere_point(random_numbers(draws).xyz); }
         float up = 2.0 * start.x - 1.0;
         float across = sqrt(max((1.0 - up) * (1.0 + up), 0.0));
         photon.direction = vec3(across * cos(2.0 * PI * start.y), across * sin(2.0 * PI * start.y), up);
@@ -83,6 +92,7 @@ Photon begun(uint number, inout Draws draws, out vec3 power) {
     vec3 target = aim_middle + (2.0 * start.x - 1.0) * aim_right + (2.0 * start.y - 1.0) * aim_up;
     float back = 2.0 * surface_reach;
     if (light_from.w == 1.0) {
+        if (light_radius > 0.0) { light_at += light_radius * disc_point(normalize(target - light_at), start.zw); }
         vec3 to_target = target - light_at;
         float distance_m = length(to_target);
         photon.direction = to_target / distance_m;

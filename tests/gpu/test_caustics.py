@@ -273,6 +273,19 @@ def test_samples_do_not_blur_a_focus(renderer: tl.Renderer, landed: Landed) -> N
         assert np.linalg.norm(found - straight - truth) < 0.03 * np.linalg.norm(truth), samples
 
 
+def test_a_light_with_a_size_has_a_sharp_image(renderer: tl.Renderer, landed: Landed) -> None:
+    """Photons that start side by side begin at nearly one point of the light. If any point counted, each would be
+    as wide as a pixel, and the error .05; it is .004.
+    """
+    camera = tl.Camera.orthographic((0.01, 0.4, 0.01), (0.01, 0, 0.01), (0, 0, 1), height=4.0)
+    one = scene(ball(height=1.5), GROUND, light=tl.SphereLight((0.0, 8.0, 0.0), 50.0, 0.2), camera=camera)
+    found = photons_in(renderer, one, (60, 60), tl.Caustics(100_000))[..., 0]
+    points, edges = landed.points(one) - camera.eye, np.linspace(-2.0, 2.0, 61)
+    given = -points @ camera.up, points @ camera.right
+    truth = np.histogram2d(*given, (edges, edges), weights=landed.power[:, 0])[0] * 15.0**2
+    assert np.linalg.norm(found - truth) < 0.01 * np.linalg.norm(truth)
+
+
 def test_even_light_is_even(renderer: tl.Renderer) -> None:
     """Through a flat window: half as wide photons vary more than the bar, and by chance twice as much."""
     window = tl.Object(Box((-1, 1, -1), (1, 1.2, 1)).tessellate(), tl.Medium(ior=1.9))

@@ -44,7 +44,7 @@ def view() -> Iterator[ViewportRenderer]:
 @pytest.fixture
 def points(monkeypatch: pytest.MonkeyPatch) -> None:
     """Photons are points: their squares are the smaller the more have been followed with them."""
-    monkeypatch.setattr(caustics_pass, "neighbors", lambda count: (3, 6, np.inf))
+    monkeypatch.setattr(caustics_pass, "neighbors", lambda *given: (3, 6, np.inf))
 
 
 @pytest.mark.usefixtures("points")

@@ -46,8 +46,13 @@ ROUNDS, ROUNDS_FROM = range(4, 8), 8
 #: Photons that are followed together: 48 bytes each are kept of them.
 BATCH = PHOTON_WIDTH * 512
 
-#: What `start_of` of ``shaders/transport/photon_step.glsl`` adds for each photon to its start in the unit square.
-_STEP = np.array([3242174889, 2447445414]) / 2.0**32
+#: What `start_of` of ``shaders/transport/photon_step.glsl`` adds for each photon to where it is aimed at, and to where
+#: it begins on the disc of a light.
+_STEP = np.array([3242174889, 2447445414, 1188417451, 3613785483]) / 2.0**32
+
+#: Weight of the distance on the disc of a light, for photons that start side by side: with a quarter of a million they
+#: differ by a seventieth of what is aimed at, and by a seventh of the light.
+_ON_LIGHT = 0.1
 
 #: Bytes that are kept of a photon, by the names of the buffers.
 _BYTES = {"photons": 76, "live_photons": 12, "photon_segments": 24}
@@ -131,7 +136,7 @@ class CausticsPass:
                 self._streams.follow(job, tracer.programs, tracer.landed, count)
             else:
                 self._follow(tracer.programs[0], tracer.landed, count)
-            first_one, other, area = neighbors(count)
+            first_one, other, area = neighbors(count, tracer.aims[number].light_radius > 0.0)
             apart = ENOUGH * tracer.channels / (area * max(tracer.aims[number].photons, end))
             set_used(self._splat.program(), {"beside": (first_one, other), "footprint": apart})
             self._add(job, tracer.landed, count)
@@ -256,12 +261,13 @@ def _disperses(scene: Scene) -> bool:
 
 
 @lru_cache(maxsize=16)
-def neighbors(count: int) -> tuple[int, int, float]:
+def neighbors(count: int, sized: bool) -> tuple[int, int, float]:
     """Photons of a batch that start side by side: what their numbers differ by, in two directions, and by which area.
 
     Starts are a lattice: any photon has these neighbors where the batch has their numbers. They are the nearest ones
     among those whose numbers differ by at most a quarter of the batch, and by multiples of 3: these carry the same
-    channel of light.
+    channel of light. Of a light with a size, they begin at nearly the same point of it, too: the distance of others
+    where they land would be that of images of the light, and not of what is between photons.
 
     Returns
     -------
@@ -271,10 +277,11 @@ def neighbors(count: int) -> tuple[int, int, float]:
     """
     numbers = np.arange(3, max(count // 4, 30) + 1, 3)
     steps = (numbers[:, None] * _STEP + 0.5) % 1.0 - 0.5
-    length = np.hypot(*steps.T)
+    aside = np.hypot(steps[:, 0], steps[:, 1])
+    length = np.hypot(aside, _ON_LIGHT * np.hypot(steps[:, 2], steps[:, 3])) if sized else aside
     one = int(length.argmin())
     areas = np.abs(steps[one, 0] * steps[:, 1] - steps[one, 1] * steps[:, 0])
-    other = int(np.where(areas > 0.5 * length[one] * length, length, np.inf).argmin())
+    other = int(np.where(areas > 0.5 * aside[one] * aside, length, np.inf).argmin())
     return int(numbers[one]), int(numbers[other]), float(areas[other])
 
 
@@ -287,7 +294,7 @@ def _aim_values(aim: PhotonAim, number: int, job: FrameJob) -> dict[str, Any]:
     """Loose uniforms of photons with an aim of that number."""
     assert job.plan.caustics is not None
     entries = [*(i + 1 for i in aim.inside[:8]), *[0] * (8 - len(aim.inside[:8]))]
-    shift = np.random.default_rng((job.plan.caustics.seed, number)).random(2)
+    shift = np.random.default_rng((job.plan.caustics.seed, number)).random(4)
     return {
         "aim": number,
         "aim_shift": tuple(shift),
