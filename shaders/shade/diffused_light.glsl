@@ -85,6 +85,12 @@ vec3 inclusion_exitance(int object, vec3 point, vec3 color) {
     return color * irradiance / (PI * row.ior * row.ior);
 }
 
+// Transmittance for light of an opaque surface inside an object: what is scattered ahead on its way still comes from about there.
+vec3 unturned_transmittance(int object, vec3 optical_depth) {
+    ObjectRow row = object_table_row(object);
+    return transmittance(row.diffuses < 0.5 ? optical_depth : (1.0 - row.ahead) * optical_depth);
+}
+
 // Environment in a direction, over what events ahead make of it by a depth of these.
 vec3 blurred_ahead(ObjectRow row, vec3 direction, vec3 depth) {
     if (row.ahead_deepest == 0.0) { return environment_light(direction, IN_SCATTERED_ROUGHNESS); }
@@ -158,5 +164,6 @@ vec3 ahead_from_lights(int object, vec3 far_end, vec3 normal, vec3 direction, ve
 vec3 ahead_from_lights(int object, vec3 far_end, vec3 normal, vec3 direction, vec3 optical_depth) { return vec3(0.0); }
 vec3 subsurface_exitance(int object, vec3 point, vec3 normal, vec3 direction, float cosine, float path, vec3 optical_depth) { return vec3(0.0); }
 vec3 ahead_in_scattered(int object, vec3 direction, vec3 normal, vec3 optical_depth) { return vec3(0.0); }
+vec3 unturned_transmittance(int object, vec3 optical_depth) { return transmittance(optical_depth); }
 vec3 inclusion_exitance(int object, vec3 point, vec3 color) { return vec3(0.0); }
 #endif

@@ -160,8 +160,9 @@ bool is_layer(int body) {
 }
 
 // Adds what media emit and scatter towards the eye along a segment, and attenuates its ray; returns the transmittance.
-// normal: where it ends; 0 where that is not known.
-vec3 through_media(inout Ray ray, int effective, Hit hit, vec3 normal) {
+// normal: where it ends; 0 where that is not known. on_opaque: it ends on an opaque object, and light that is scattered ahead comes
+// from there.
+vec3 through_media(inout Ray ray, int effective, Hit hit, vec3 normal, bool on_opaque) {
     if (ray.interior.x == 0u) { return vec3(1.0); }
     if (hit.object < 0) { lose(ray); }  // it has left through a hole
     Medium medium = medium_in(ray.interior, effective);
@@ -180,9 +181,13 @@ vec3 through_media(inout Ray ray, int effective, Hit hit, vec3 normal) {
     if (effective != AIR) {
         float cosine = clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0);
         traced_radiance += ray.throughput * subsurface_exitance(effective, ray.origin, ray.outwards, ray.direction, cosine, path, medium.extinction * path);
-        traced_radiance += ray.throughput * ahead_in_scattered(effective, ray.direction, normal, medium.extinction * path);
-        vec3 far_end = ray.origin + hit.path * ray.direction;
-        traced_radiance += ray.throughput * ahead_from_lights(effective, far_end, ray.outwards, ray.direction, medium.extinction * path);
+        if (on_opaque) {
+            passed = unturned_transmittance(effective, medium.extinction * path);
+        } else {
+            traced_radiance += ray.throughput * ahead_in_scattered(effective, ray.direction, normal, medium.extinction * path);
+            vec3 far_end = ray.origin + hit.path * ray.direction;
+            traced_radiance += ray.throughput * ahead_from_lights(effective, far_end, ray.outwards, ray.direction, medium.extinction * path);
+        }
     }
 #endif
     ray.throughput *= passed;
@@ -368,7 +373,7 @@ void leave_bodies(inout Ray ray, inout int effective) {
 void leave(Ray ray, Hit hit) {
     int before = effective_medium(ray.interior);
     leave_bodies(ray, before);
-    through_media(ray, before, hit, vec3(0.0));
+    through_media(ray, before, hit, vec3(0.0), false);
     escape(ray, escaped_ray(ray, AIR, vec3(0.0), ray.origin));
 }
 
@@ -381,7 +386,8 @@ int follow_to_end(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, in
     bool leaves = !hits && hit.object < 0;
     if (leaves && hit.path < NOTHING) { return ONE; }
     if (leaves) { leave_bodies(ray, before); }
-    vec3 passed = through_media(ray, before, hit, leaves ? vec3(0.0) : surface.smooth_normal);
+    bool on_opaque = !leaves && surface.object >= 0 && int(object_table_row(surface.object).type) == TYPE_OPAQUE;
+    vec3 passed = through_media(ray, before, hit, leaves ? vec3(0.0) : surface.smooth_normal, on_opaque);
     if (leaves) {
         escape(ray, escaped_ray(ray, AIR, vec3(0.0), ray.origin));
         return NONE;

@@ -251,6 +251,28 @@ def test_what_is_scattered_ahead_is_not_lost(renderer: tl.Renderer, scattering: 
     np.testing.assert_allclose(found, same, atol=2e-3)
 
 
+@pytest.mark.parametrize("backend", [None, "cpu"])
+def test_an_opaque_ball_is_seen_through_what_is_scattered_ahead(renderer: tl.Renderer, backend: str | None) -> None:
+    """Its light is, as that of the environment is, and none of it comes from behind it: a black ball in a medium of g
+    = .98 is as dark as in the medium without scattering ahead, 40 (1 - g), in which it is .25 as bright as white light.
+    """
+    ball = tl.Object(Sphere(radius=0.5).tessellate(32), None, color=(0.0, 0.3, 1.0))
+
+    def middle(scattering: float, anisotropy: float) -> Any:
+        body = tl.Object(BALL, tl.Medium(scattering=scattering, anisotropy=anisotropy, ior=1.3))
+        scene = tl.Scene([body, ball], CAMERA, (), WHITE)
+        if backend is None:
+            frame = renderer.render(scene, (16, 16), samples=4)
+        else:
+            with tl.Renderer(backend=backend) as other:
+                frame = other.render(scene, (16, 16), samples=4)
+        return frame.radiance[7:9, 7:9].mean(axis=(0, 1))
+
+    seen = middle(40.0, 0.98)
+    np.testing.assert_allclose(seen, middle(0.8, 0.0), atol=0.01)
+    assert seen[0] < 0.35
+
+
 def test_bodies_of_uneven_density_vanish_in_white_light(renderer: tl.Renderer) -> None:
     """Lossless ones behind an interface, in screen space, and along the rays of the CPU: with what is scattered ahead,
     which rays lose and diffusion does not have. Four times as dense on one side. Measured: mean 1.015, .91 to 1.17.

@@ -416,16 +416,31 @@ class _Growth:
         if emitted is not None:
             self._add(own, emitted)
         if self.tree.diffused:
-            first = face[inside, (face[inside] >= 0).argmax(axis=1)]
-            self._add_diffused(own, passed, first, length[inside])
-            self._add_ahead_from_lights(own, length[inside] * self.caster.radius, passed)
+            hits = face[inside]
+            first = hits[np.arange(len(inside)), (hits >= 0).argmax(axis=1)]
+            # What is scattered ahead comes from an opaque object where the branch ends on one, and not from behind it.
+            items = np.where(hits >= 0, self.caster.faces.item[hits], NOTHING)
+            goes_on = np.asarray(~self.table.is_opaque[items].any(axis=1))
+            self._add_diffused(own, passed, first, length[inside], goes_on)
+            on = np.flatnonzero(goes_on)
+            self._add_ahead_from_lights(own.where(on), length[inside][on] * self.caster.radius, passed[on])
+            passed = np.where(goes_on[:, None], passed, self._unturned(own, passed))
         throughput = branches.throughput.copy()
         with np.errstate(under="ignore"):
             throughput[inside] *= passed
         return replace(branches, throughput=throughput)
 
-    def _add_diffused(self, branches: Branches, passed: Array, face: Integers, length: Array) -> None:
-        """Add subsurface light, and in-scattered light of forward scattering, which diffusion counts as unscattered."""
+    def _unturned(self, branches: Branches, passed: Array) -> Array:
+        """(n, 3): transmittance without scattering ahead, for a transmittance (n, 3)."""
+        ahead = self.tree.diffused.in_scattered(self.media.effective(branches.interior))[:, 0]
+        with np.errstate(under="ignore"):
+            return np.asarray(passed ** (1.0 - ahead))
+
+    def _add_diffused(self, branches: Branches, passed: Array, face: Integers, length: Array, goes_on: Mask) -> None:
+        """Add subsurface light, and in-scattered light of forward scattering, which diffusion counts as unscattered.
+
+        The latter where branches go on (n,).
+        """
         body = self.media.effective(branches.interior)
         ahead, far, near = np.moveaxis(self.tree.diffused.in_scattered(body), 1, 0)
         optical_depth, rays = -np.log(np.maximum(passed, np.finfo(np.float64).tiny)), self._rays(branches)
@@ -433,7 +448,7 @@ class _Growth:
         diffused = self.tree.diffused.radiance(body, points, rays.directions, branches.outwards, path, optical_depth)
         with np.errstate(under="ignore"):
             self._add(branches, diffused * (1.0 - passed ** (1.0 - ahead)))
-        in_scattered = np.flatnonzero(ahead.any(axis=1))
+        in_scattered = np.flatnonzero(ahead.any(axis=1) & goes_on)
         if in_scattered.size:
             own, ahead, far, near = (
                 branches.where(in_scattered),
