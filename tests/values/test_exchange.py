@@ -76,6 +76,23 @@ def test_nothing_is_seen_of_lossless_bodies_beside_each_other() -> None:
             assert np.sqrt(((found / free - 1.0) ** 2).mean()) < 0.05
 
 
+@pytest.mark.parametrize("gap", [0.02, 0.1])
+def test_light_goes_to_and_fro_in_a_narrow_gap_until_it_has_left(gap: float) -> None:
+    """In uniform light lossless blocks are as bright as alone, in all color channels: two rounds lack 4 %."""
+    blocks = [
+        tl.Object(Box((x + gap / 2, -0.5, -0.5), (x + 1 - gap / 2, 0.5, 0.5)).tessellate(), LOSSLESS) for x in (-1, 0)
+    ]
+
+    def leaving(*objects: tl.Object) -> Array:
+        scene = tl.Scene(objects, CAMERA, environment=WHITE)
+        found = FieldCache().of(plan(scene, scattering=Diffusion(12)))
+        return np.concatenate([one.leaving for one in found.surfaces.values()])
+
+    ratio = leaving(*blocks) / np.concatenate([leaving(block) for block in blocks])
+    assert np.ptp(ratio.mean(axis=0)) < 0.01
+    assert np.abs(ratio.mean(axis=0) - 1.0).max() < 0.02
+
+
 def test_a_body_in_another_one_does_not_receive_its_light_twice() -> None:
     """Light that the outer body sends outwards does not reach the inner body."""
     inner, outer = Sphere(radius=0.4).tessellate(16), Sphere().tessellate(16)

@@ -59,8 +59,8 @@ Volume = npt.NDArray[np.float32]
 DIRECTED = 0.05
 
 #: Mean flux on a body from others, as a fraction of what the brightest sends out, below which it is left out; and the
-#: largest ratio of one round of light between bodies to the round before.
-ENOUGH, MOST_AGAIN = 5e-3, 0.9
+#: largest number of rounds of light between bodies.
+ENOUGH, MOST_ROUNDS = 5e-3, 8
 
 #: Largest `part` of light that is added to other light: with 1, `BodySystem.solved` would count emission again.
 MOST_PART = 0.99
@@ -516,30 +516,52 @@ def lit_by_each_other(
 ) -> dict[int, DiffuseSolution]:
     """Solutions of bodies, by number, that light each other.
 
-    `found` are solutions for all other light, and `others` the bodies that each body sees. Two rounds of light between
-    bodies are solved (radiosity, Goral et al. 1984). Further rounds are a geometric series: nearly all of their light
-    goes to and fro between the same near surfaces.
+    `found` are solutions for all other light, and `others` the bodies that each body sees. Light goes from body to body
+    in rounds (radiosity, Goral et al. 1984). All rounds together are a sum of the first ones, with a weight for each
+    round, body and color channel: those that leave the least flux unaccounted for (minimal residuals, Saad and Schultz
+    1986). Further rounds are solved until next to nothing is left on each body.
     """
-    whole = max((float(one.leaving.mean()) for one in found.values()), default=0.0)
+    total, places, count = dict(found), dict[int, slice](), 0
+    for i, body in bodies.items():
+        if others[i]:
+            places[i] = slice(count, count := count + len(body.lit.grid.points))
+    if not places:
+        return total
+    from scipy.optimize import nnls  # slow to import, and for several bodies only
 
-    def received(last: Mapping[int, DiffuseSolution]) -> dict[int, Array]:
-        every = {
-            i: body.from_others([last.get(k) for k in others[i]])
-            for i, body in bodies.items()
-            if any(k in last for k in others[i])
-        }
-        return {i: flux for i, flux in every.items() if flux.mean() > ENOUGH * whole}
+    whole = max(float(one.leaving.mean()) for one in found.values())
 
-    def answers(entering: Mapping[int, Array]) -> dict[int, DiffuseSolution]:
-        return {i: bodies[i].lit_by(flux, min(float(flux.mean()) / whole, MOST_PART)) for i, flux in entering.items()}
+    def received(last: Mapping[int, DiffuseSolution]) -> Array:
+        """(s, 3): flux on the samples of all bodies that see others, by the light of some."""
+        flux = np.zeros((count, 3))
+        for i, place in places.items():
+            if last.keys() & set(others[i]):
+                flux[place] = bodies[i].from_others([last.get(k) for k in others[i]])
+        return flux
 
-    first = received(found)
-    total, last = dict(found), answers(first)
-    for i, more in last.items():
-        total[i] = total[i].plus(more)
-    second = received(last)
-    before = max(sum(float((flux**2).sum()) for flux in first.values()), np.finfo(np.float64).tiny)
-    again = min(sum(float((flux * first[i]).sum()) for i, flux in second.items() if i in first) / before, MOST_AGAIN)
-    for i, more in answers({i: flux / (1.0 - again) for i, flux in second.items()}).items():
-        total[i] = total[i].plus(more)
+    def lit(flux: Array) -> list[int]:
+        """Bodies on which a flux (s, 3) is more than next to nothing."""
+        return [i for i, place in places.items() if np.abs(flux[place]).mean() > ENOUGH * whole]
+
+    first = flux = received(found)
+    answers, missing, weights = list[tuple[int, DiffuseSolution]](), list[Array](), np.zeros((0, 3))
+    for _ in range(MOST_ROUNDS):
+        if not (bright := lit(flux)):
+            break
+        following = np.zeros_like(flux)
+        for i in bright:
+            own = np.zeros_like(flux)
+            own[places[i]] = flux[places[i]]
+            answers.append((i, bodies[i].lit_by(own[places[i]], min(float(own[places[i]].mean()) / whole, MOST_PART))))
+            sent = received(dict(answers[-1:]))
+            missing.append(own - sent)
+            following += sent
+        columns = np.stack(missing, axis=-1)
+        # Light adds to light: no weight is negative.
+        weights = np.stack([nnls(columns[:, c], first[:, c])[0] for c in range(3)], axis=1)
+        if not lit(first - np.einsum("scr,rc->sc", columns, weights)):
+            break
+        flux = following
+    for (i, more), weight in zip(answers, weights, strict=True):
+        total[i] = total[i].plus(more.times(weight))
     return total

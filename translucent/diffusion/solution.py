@@ -122,6 +122,11 @@ class DiffuseSolution:
     scattered: Array
     steps: int
 
+    def times(self, factor: Array) -> DiffuseSolution:
+        """Solution for `factor` (3,) times the light, by color channel."""
+        names = ("fluence", "entering", "inside", "at_inclusions", "leaving", "passing")
+        return replace(self, **{name: factor * getattr(self, name) for name in names})
+
     def plus(self, more: DiffuseSolution) -> DiffuseSolution:
         """Sum of two solutions for one body: its light if both fall on it."""
         own, other = self.entering.sum(axis=1), more.entering.sum(axis=1)
