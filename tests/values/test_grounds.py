@@ -11,6 +11,7 @@ import translucent as tl
 from translucent.arrays import Array
 from translucent.diffusion.cache import FieldCache
 from translucent.geometry.solids import Box, Sphere
+from translucent.planning.bodies import held_objects, may_hold
 from translucent.planning.plan import plan
 from translucent.planning.rendered import Treatment
 from translucent.planning.scattering import Diffusion
@@ -149,3 +150,19 @@ def test_a_slab_is_as_a_plane(ior: float) -> None:
     assert other.ground is not None
     np.testing.assert_allclose(other.surfaces[0].leaving, one.surfaces[0].leaving, rtol=1e-3)
     np.testing.assert_allclose(other.ground.values, one.ground.values, rtol=1e-3, atol=1e-4)
+
+
+@pytest.mark.parametrize("sunk", [0.0, 1e-6])
+def test_what_a_body_stands_on_is_not_inside(sunk: float) -> None:
+    """However tilted both are, so that their boxes overlap; but what pierces a face of its box is."""
+    place, shift = rotation(), np.eye(4)
+    shift[1, 3] = -0.01 - sunk
+    ball = tl.Object(BALL.mesh, tl.Medium(ior=1.4), place @ shift)
+    rod = tl.Object(Box((-0.1, -2, -0.1), (0.1, 0.2, 0.1)).tessellate(), transform=place)
+    room = Box((-3, 0, -3), (3, 3, 3)).tessellate()
+    around = tl.Object(tl.Mesh(room.vertices, room.faces[:, ::-1]), transform=place)
+    ground = slab(3.0, transform=place)
+    assert (ball.bounds[1] > ground.bounds[0]).all()
+    for item, held in ((ground, False), (around, False), (rod, True)):
+        assert may_hold(ball, item) == held
+        assert held_objects(scene(ball, item)) == ((1,) if held else ())

@@ -16,7 +16,7 @@ from translucent.errors import InputError
 from translucent.media.medium import Medium
 from translucent.planning.passes import Note, NoteKind
 from translucent.planning.rendered import Treatment, treatment_of
-from translucent.scene.grounds import ground_below
+from translucent.scene.grounds import SUNK, ground_below
 from translucent.scene.scene import Object, Scene, first_overlap, object_names
 from translucent.scene.texture import Falloff, Texture
 
@@ -38,15 +38,30 @@ LARGEST_EXCHANGING = 2.0
 
 
 def may_hold(body: Object, item: Object) -> bool:
-    """Test whether an opaque object may be inside a body, and so receive the light in it."""
-    return _may_be_inside(item, *body.bounds)
+    """Test whether an object may be inside a body, at least in part, and so receive the light in it."""
+    return _may_be_inside(item, *body.bounds) and (item.medium is not None or _has_faces_in(body, item))
+
+
+def _has_faces_in(body: Object, item: Object) -> bool:
+    """Test whether faces of an object may cross the box of a body's mesh: not those of a table on which it stands.
+
+    Axes of the box and normals of the faces separate them (Gottschalk, Lin & Manocha 1996, "OBBTree").
+    """
+    to_box = np.linalg.inv(body.matrix) @ item.matrix
+    corners = (item.mesh.vertices @ to_box[:3, :3].T + (to_box[:3, 3] - body.mesh.center))[item.mesh.faces]
+    half = 0.5 * (body.mesh.bounds[1] - body.mesh.bounds[0]) - SUNK * body.mesh.diagonal
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    apart = ((corners.min(axis=1) > half) | (corners.max(axis=1) < -half)).any(axis=1)
+    apart |= np.abs((normals * corners[:, 0]).sum(axis=1)) > np.abs(normals) @ half
+    return not apart.all()
 
 
 def held_objects(scene: Scene) -> tuple[int, ...]:
     """Numbers of the opaque objects that may be inside clear bodies."""
-    bounds = np.reshape([body.bounds for body in _clear_bodies(scene)], (-1, 2, 3))
-    low, high = bounds[:, 0], bounds[:, 1]
-    return tuple(i for i, item in enumerate(scene.objects) if item.medium is None and _may_be_inside(item, low, high))
+    clear = _clear_bodies(scene)
+    return tuple(
+        i for i, item in enumerate(scene.objects) if item.medium is None and any(may_hold(body, item) for body in clear)
+    )
 
 
 def _may_be_inside(item: Object, low: Array, high: Array) -> bool:
