@@ -145,7 +145,7 @@ def test_the_light_of_a_glowing_ball_on_a_ground() -> None:
     """A ball that emits q V W/sr, and neither absorbs nor bends light, is like a point (Newton's shell theorem)."""
     ball = tl.Object(Sphere(radius=0.5).tessellate(64), tl.Medium(emission=(1, 2, 3)))
     glass = tl.Object(Sphere(radius=0.7).tessellate(64), tl.Medium(ior=1.4), priority=-1)
-    board = tl.Object(Box((0.7, -0.98, -4), (4, -0.93, 4)).tessellate(), None)
+    board = tl.Object(Box((0.7, -0.98, -0.4), (4, -0.93, 0.4)).tessellate(), None)
     hidden, bare = (plan(tl.Scene(objects, CAMERA)) for objects in ([ball, ground(), board], [ball, ground()]))
     assert bare.glowing == (0,)
     alone, beside = (FieldCache().of(one).ground for one in (bare, hidden))

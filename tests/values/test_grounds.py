@@ -89,6 +89,16 @@ def test_which_planes_are_grounds() -> None:
     assert ground_below(scene(BALL, other, table), [0, 1]) is None
 
 
+def test_bodies_may_be_sunk_in_grounds() -> None:
+    """Up to their middles, but not in flat objects: light would diffuse through these."""
+    for depth, found in ((0.01 - 1e-6, True), (0.4, True), (0.6, False)):
+        down = np.eye(4)
+        down[1, 3] = -depth
+        sunk = tl.Object(BALL.mesh, MILK, down)
+        assert (ground_below(scene(sunk, slab(3.0)), [0]) is not None) == found
+        assert (ground_below(scene(sunk, flat(3.0)), [0]) is not None) == (depth < 0.01)
+
+
 def test_how_wide_a_ground_is() -> None:
     """A square of half width a at distance d fills 4 atan(a^2 / (d sqrt(2 a^2 + d^2))) / (2 pi) of the half space."""
     d = 0.51

@@ -169,6 +169,14 @@ def _matched_wax_on_a_ground() -> tl.Scene:
     return viewed([body, ground(0.4)], 0.06, 0.025, [sun], DIM)
 
 
+def _wax_over_an_edge() -> tl.Scene:
+    matched = tl.Medium(WAX.absorption, WAX.scattering, anisotropy=0.3)
+    body = tl.Object(mesh("bear"), matched, placed(3.0, turn=-18.0))
+    board = Box((-0.1, -0.03, -0.1), (0.004, 0.0, 0.1)).tessellate()
+    white = tl.Object(board, color=(0.8, 0.78, 0.75), surface=tl.Surface(ior=1.0, roughness=1.0))
+    return viewed([body, white], 0.06, 0.025, [tl.DirectionalLight((-0.5, -0.7, -0.45), 3.0)], DIM)
+
+
 SCENES = {
     name.removeprefix("_"): make
     for name, make in {
@@ -187,6 +195,7 @@ SCENES = {
             _ice_in_a_drink,
             _wax_on_a_ground,
             _matched_wax_on_a_ground,
+            _wax_over_an_edge,
         )
     }.items()
 }
