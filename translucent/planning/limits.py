@@ -403,7 +403,7 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
         if any(body.medium is not None and body.medium.emits for body in bodies):
             text += "; light that the bodies emit and scatter is up to 10 % too dark"
         if held := [item for item in scene.opaque if any(may_hold(body, item) for body in bodies)]:
-            text += f"; the light around {object_names(held)} inside the bodies is wrong by up to 25 %"
+            text += f"; the light around {object_names(held)} inside the bodies is wrong by up to 15 %"
         beside = [item for item in scene.opaque if not any(may_hold(body, item) for body in bodies)]
         if others := _off_ground(beside, ground):
             text += f"; light from these bodies does not reach {object_names(others)}: up to 10 % too dark there"
