@@ -59,9 +59,13 @@ def _has_faces_in(body: Object, item: Object) -> bool:
 def held_objects(scene: Scene) -> tuple[int, ...]:
     """Numbers of the opaque objects that may be inside clear bodies."""
     clear = _clear_bodies(scene)
-    return tuple(
-        i for i, item in enumerate(scene.objects) if item.medium is None and any(may_hold(body, item) for body in clear)
-    )
+    bounds = np.reshape([body.bounds for body in clear], (-1, 2, 3))
+    near = [
+        i
+        for i, item in enumerate(scene.objects)
+        if item.medium is None and _may_be_inside(item, *bounds.swapaxes(0, 1))
+    ]
+    return tuple(i for i in near if any(may_hold(body, scene.objects[i]) for body in clear))
 
 
 def _may_be_inside(item: Object, low: Array, high: Array) -> bool:
