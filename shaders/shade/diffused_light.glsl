@@ -85,12 +85,6 @@ vec3 inclusion_exitance(int object, vec3 point, vec3 color) {
     return color * irradiance / (PI * row.ior * row.ior);
 }
 
-// Transmittance for light of an opaque surface inside an object: what is scattered ahead on its way still comes from about there.
-vec3 unturned_transmittance(int object, vec3 optical_depth) {
-    ObjectRow row = object_table_row(object);
-    return transmittance(row.diffuses < 0.5 ? optical_depth : (1.0 - row.ahead) * optical_depth);
-}
-
 // Environment in a direction, over what events ahead make of it by a depth of these.
 vec3 blurred_ahead(ObjectRow row, vec3 direction, vec3 depth) {
     if (row.ahead_deepest == 0.0) { return environment_light(direction, IN_SCATTERED_ROUGHNESS); }
@@ -107,21 +101,14 @@ vec3 blurred_ahead(ObjectRow row, vec3 direction, vec3 depth) {
 
 // Radiance that comes along a ray, in a direction inside, by light that is scattered ahead in an object, and which diffusion
 // takes for unscattered: of the optical depth on the ray the part by such events does not count. From the environment behind,
-// blurred, where the ray leaves, and of what is mirrored there. normal: where it leaves; 0 where that is not known, and
-// the ray counts as going straight on.
-vec3 ahead_in_scattered(int object, vec3 direction, vec3 normal, vec3 optical_depth) {
+// blurred, as if the ray left straight on, and of what is mirrored there. For pictures whose rays are not followed inside.
+vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) {
     ObjectRow row = object_table_row(object);
     vec3 in_scattered = transmittance((1.0 - row.ahead) * optical_depth) - transmittance(optical_depth);
     if (max(in_scattered.r, max(in_scattered.g, in_scattered.b)) <= 0.0) { return vec3(0.0); }
-    vec3 leaving = direction, depth = row.ahead * optical_depth;
-    float cosine = 1.0;
-    if (normal != vec3(0.0)) {
-        vec3 facing = dot(direction, normal) < 0.0 ? normal : -normal;
-        cosine = -dot(direction, facing);
-        if (fresnel_dielectric(cosine, 1.0 / row.ior) < 1.0) { leaving = refracted_direction(direction, facing, 1.0 / row.ior); }
-    }
-    vec3 mirrored = ahead_mirrored(cosine, row.ior, row.inner_mirror, row.inner_mirror_flux, depth, row.ahead_cosine);
-    vec3 found = (1.0 - mirrored) * blurred_ahead(row, leaving, depth);
+    vec3 depth = row.ahead * optical_depth;
+    vec3 mirrored = ahead_mirrored(1.0, row.ior, row.inner_mirror, row.inner_mirror_flux, depth, row.ahead_cosine);
+    vec3 found = (1.0 - mirrored) * blurred_ahead(row, direction, depth);
     if (row.ior > 1.0) {
         vec3 far = row.in_scattered_far * environment_light(direction, IN_SCATTERED_ROUGHNESS);
         found += mirrored * (far + row.in_scattered_near * environment_light(-direction, IN_SCATTERED_ROUGHNESS));
@@ -163,7 +150,6 @@ vec3 ahead_from_lights(int object, vec3 far_end, vec3 normal, vec3 direction, ve
 #else
 vec3 ahead_from_lights(int object, vec3 far_end, vec3 normal, vec3 direction, vec3 optical_depth) { return vec3(0.0); }
 vec3 subsurface_exitance(int object, vec3 point, vec3 normal, vec3 direction, float cosine, float path, vec3 optical_depth) { return vec3(0.0); }
-vec3 ahead_in_scattered(int object, vec3 direction, vec3 normal, vec3 optical_depth) { return vec3(0.0); }
-vec3 unturned_transmittance(int object, vec3 optical_depth) { return transmittance(optical_depth); }
+vec3 ahead_in_scattered(int object, vec3 direction, vec3 optical_depth) { return vec3(0.0); }
 vec3 inclusion_exitance(int object, vec3 point, vec3 color) { return vec3(0.0); }
 #endif

@@ -128,7 +128,7 @@ vec3 multiply_scattered(Surface surface, int object, vec3 point, vec3 normal, ve
     vec3 inside = starts_inside ? ray : refracted_direction(ray, normal, surface.ior);
     light += subsurface_exitance(object, point, starts_inside ? vec3(0.0) : normal, inside, cosine_inside, crossing.thickness, crossing.optical_depth);
     if (!starts_inside) { light += ahead_from_lights(object, point + crossing.thickness * inside, normal, inside, crossing.optical_depth); }
-    return light + ahead_in_scattered(object, inside, vec3(0.0), crossing.optical_depth);
+    return light + ahead_in_scattered(object, inside, crossing.optical_depth);
 }
 
 void main() {

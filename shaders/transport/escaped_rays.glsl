@@ -1,6 +1,6 @@
 // Radiance at the ends of rays: of the environment, or of an opaque object. Needs <View>, <Surfaces>, <ObjectRow>,
 // shade/environment_light.glsl, shade/environment_beyond.glsl, shade/background.glsl, opaque_objects.glsl, textured_hit.glsl
-// and footprint.glsl.
+// and footprint.glsl. AHEAD: some bodies scatter light ahead, for which needs shade/diffused_light.glsl.
 
 // The environment in a polished mirror: as it is defined, where it is no picture.
 vec3 polished_environment(vec3 direction) {
@@ -22,6 +22,16 @@ vec3 environment_radiance(vec3 point, vec3 direction, bool reflected, float blur
 #endif
 }
 
+// Scattering events on a ray that its light counts as going straight on: see `through_media`. It sees what is at its end as sharp
+// as without them by exp(-depth), and else blurred.
+struct EventsAhead {
+    vec3 depth;        // optical depth of these events
+    float path;        // metres from them, on average
+    int body;          // in which they were last; AIR for none
+};
+
+const EventsAhead NONE_AHEAD = EventsAhead(vec3(0.0), 0.0, AIR);
+
 // The end of a ray that has left the scene, or has hit an opaque object.
 struct EscapedRay {
     int object;        // that is opaque; AIR for the environment
@@ -35,6 +45,7 @@ struct EscapedRay {
     bool reflected;
     float blur;
     Ellipse ellipse;
+    EventsAhead ahead;
 };
 
 // Metres across a pixel, at a distance from the eye.
@@ -85,14 +96,30 @@ bool environment_in_footprint(EscapedRay end, out vec3 light) {
 }
 
 #if OPAQUE
+// The opaque object at the end of a ray, its textures averaged over what the ray sees of it: by light that is scattered ahead a
+// blur as wide as a box of the same variance.
+ObjectRow body_at_end(EscapedRay end) {
+    if (end.triangle < 0) { return traced_body(end.object); }
+    ObjectRow body = body_at(end.object, end.triangle, end.weights, end.width);
+#if AHEAD && TEXTURED
+    if (end.ahead.body != AIR) {
+        // Events ahead have the second Legendre moment g.
+        float sine = sqrt(2.0 / 3.0 * (1.0 - object_table_row(end.ahead.body).ahead_cosine));
+        float across = end.ahead.path * sine * inversesqrt(1.0 - sine * sine);
+        vec3 blurred = body_at(end.object, end.triangle, end.weights, max(end.width, sqrt(6.0) * across)).color;
+        body.color = mix(blurred, body.color, transmittance(end.ahead.depth));
+    }
+#endif
+    return body;
+}
+
 vec3 radiance_of_opaque(EscapedRay end) {
     vec3 light;
     bool has_textures = picture_first == 0 && reads_all_textures(end.object);
     bool has_light = traced_body(end.object).diffuses > 0.5;  // photons in the picture would count twice
     bool is_known = has_light || (has_textures && end.triangle >= 0 && end.blur == 0.0);
     if (is_known || !opaque_in_picture(end, light)) {
-        ObjectRow body = traced_body(end.object);
-        if (end.triangle >= 0) { body = body_at(end.object, end.triangle, end.weights, end.width); }
+        ObjectRow body = body_at_end(end);
         light = opaque_light(body, end.normal, end.direction, end.point);
     }
     return light;
@@ -101,8 +128,18 @@ vec3 radiance_of_opaque(EscapedRay end) {
 
 vec3 radiance_beyond(EscapedRay end) {
     vec3 light;
-    if (environment_in_footprint(end, light)) { return light; }
-    return environment_radiance(end.origin, end.direction, end.reflected, end.blur);
+    if (!environment_in_footprint(end, light)) { light = environment_radiance(end.origin, end.direction, end.reflected, end.blur); }
+#if AHEAD
+    if (end.ahead.body != AIR) {
+#if FOOTPRINTS
+        vec3 blurred = blurred_ahead(object_table_row(end.ahead.body), end.direction, end.ahead.depth);
+#else
+        vec3 blurred = polished_environment(end.direction);  // it has hardly any details
+#endif
+        light = mix(blurred, light, transmittance(end.ahead.depth));
+    }
+#endif
+    return light;
 }
 
 vec3 escaped_radiance(EscapedRay end) {

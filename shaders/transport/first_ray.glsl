@@ -82,7 +82,7 @@ bool first_ray(Pixel pixel, out Ray ray, out PrimaryHit primary, out float reach
     vec3 eye = point_at(pixel.center, surface_eye_axial_depth);
     float margin = min(1e-3 * surface_reach, distance(primary.point, eye));
     ray = Ray(primary.point - margin * pixel.direction, 0.0, pixel.direction, 0.0, vec3(1.0), packed_state(0, FORKS, false, MOST_INTERACTIONS),
-        0u, uvec4(0u), -pixel.direction, footprint_of(pixel.center, front.w));
+        0u, uvec4(0u), -pixel.direction, footprint_of(pixel.center, front.w), NONE_AHEAD);
 #if FROM_EYE
     // Something may lie before the first interface.
     ray.origin = point_at(pixel.center, 0.0);

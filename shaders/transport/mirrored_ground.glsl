@@ -24,6 +24,6 @@ bool begin_in_mirror(Pixel pixel, out Ray ray, out vec3 reflectance) {
     vec2 entry = reflectance_entry(cosine, mirror_surface.x);
     reflectance = mix(layer_of(vec3(step * step), entry).albedo, layer_of(mirror_metal.rgb, entry).albedo, mirror_metal.a);
     ray = Ray(point + MIRROR_MARGIN * surface_reach * normal, 0.0, reflected, blurred_fraction * alpha * alpha, reflectance,
-        packed_state(1, mirror_metal.a > 0.0 ? FORKS : 0, true, MOST_INTERACTIONS), 1u, uvec4(0u), -normal, no_footprint());
+        packed_state(1, mirror_metal.a > 0.0 ? FORKS : 0, true, MOST_INTERACTIONS), 1u, uvec4(0u), -normal, no_footprint(), NONE_AHEAD);
     return true;
 }

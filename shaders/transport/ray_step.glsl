@@ -47,6 +47,7 @@ struct Ray {
     uvec4 interior;
     vec3 outwards;      // normal of the body where it starts inside one
     Footprint footprint;
+    EventsAhead ahead;
 };
 
 // The first interface of a pixel, as the rasterizer has found it.
@@ -125,7 +126,7 @@ void add_ends() {
 }
 
 EscapedRay escaped_ray(Ray ray, int object, vec3 normal, vec3 point) {
-    return EscapedRay(object, -1, vec2(0.0), 0.0, normal, ray.origin, point, ray.direction, is_reflected(ray), ray.blur, ellipse_of(ray.footprint));
+    return EscapedRay(object, -1, vec2(0.0), 0.0, normal, ray.origin, point, ray.direction, is_reflected(ray), ray.blur, ellipse_of(ray.footprint), ray.ahead);
 }
 
 #if OPAQUE
@@ -159,10 +160,28 @@ bool is_layer(int body) {
 #endif
 }
 
-// Adds what media emit and scatter towards the eye along a segment, and attenuates its ray; returns the transmittance.
-// normal: where it ends; 0 where that is not known. on_opaque: it ends on an opaque object, and light that is scattered ahead comes
-// from there.
-vec3 through_media(inout Ray ray, int effective, Hit hit, vec3 normal, bool on_opaque) {
+#if DIFFUSED
+// Optical depth of a segment, without events ahead. Diffusion counts light that is scattered ahead as unscattered (similarity): so
+// does a ray, through all interfaces behind, and sees blurred what is at its end.
+vec3 depth_without_ahead(inout Ray ray, int body, vec3 ahead, vec3 optical_depth, float path) {
+    vec3 depth = ahead * optical_depth;
+#if AHEAD
+    float before = strength(ray.ahead.depth), here = strength(depth);
+    if (here > 0.0) {
+        ray.ahead.path = (before * ray.ahead.path + here * 0.5 * path) / (before + here);
+        ray.ahead.depth += depth;
+        ray.ahead.body = body;
+    }
+#endif
+    return optical_depth - depth;
+}
+#endif
+
+// Adds what media emit and scatter towards the eye along a segment, and attenuates its ray; returns what another path
+// as long would leave of light that is reflected back: where bodies scatter light ahead, all but what is absorbed.
+// on_opaque: it ends on an opaque object.
+vec3 through_media(inout Ray ray, int effective, Hit hit, bool on_opaque) {
+    ray.ahead.path += hit.path;
     if (ray.interior.x == 0u) { return vec3(1.0); }
     if (hit.object < 0) { lose(ray); }  // it has left through a hole
     Medium medium = medium_in(ray.interior, effective);
@@ -170,7 +189,7 @@ vec3 through_media(inout Ray ray, int effective, Hit hit, vec3 normal, bool on_o
 #if EMISSION == 1
     traced_radiance += ray.throughput * emitted_radiance(medium.emission, medium.extinction, path);
 #endif
-    vec3 passed = transmittance(medium.extinction * path);
+    vec3 passed = transmittance(medium.extinction * path), again = passed;
 #if LAYERED
     if (is_layer(effective)) {
         Surface layer = surface_of(vec4(float(effective), 0.0, 1.0, 0.0));
@@ -181,17 +200,18 @@ vec3 through_media(inout Ray ray, int effective, Hit hit, vec3 normal, bool on_o
     if (effective != AIR) {
         float cosine = clamp(-dot(ray.direction, ray.outwards), 0.0, 1.0);
         traced_radiance += ray.throughput * subsurface_exitance(effective, ray.origin, ray.outwards, ray.direction, cosine, path, medium.extinction * path);
-        if (on_opaque) {
-            passed = unturned_transmittance(effective, medium.extinction * path);
-        } else {
-            traced_radiance += ray.throughput * ahead_in_scattered(effective, ray.direction, normal, medium.extinction * path);
+        if (!on_opaque) {
             vec3 far_end = ray.origin + hit.path * ray.direction;
             traced_radiance += ray.throughput * ahead_from_lights(effective, far_end, ray.outwards, ray.direction, medium.extinction * path);
         }
+        ObjectRow row = object_table_row(effective);
+        vec3 depth = depth_without_ahead(ray, effective, row.ahead, medium.extinction * path, path);
+        passed = transmittance(depth);
+        again = row.ahead == vec3(0.0) ? passed : transmittance((1.0 - row.albedo) * depth);
     }
 #endif
     ray.throughput *= passed;
-    return passed;
+    return again;
 }
 
 // Lets a ray go on behind surfaces that do nothing to light.
@@ -274,6 +294,24 @@ void add_base(Ray ray, vec3 arriving, Interaction at, PrimaryHit primary) {
 #endif
 }
 
+// Strength of what a ray sees sharp at its end.
+float sharp_strength(Ray ray) {
+#if AHEAD
+    return strength(ray.throughput * transmittance(ray.ahead.depth));
+#else
+    return strength(ray.throughput);
+#endif
+}
+
+// Whether nothing that a ray might hit on its way would show: outside the only object, where what it sees is blurred.
+bool sees_blur_alone(Ray ray) {
+#if AHEAD && ONE_OBJECT
+    return ray.interior.x == 0u && sharp_strength(ray) < faintest_throughput;
+#else
+    return false;
+#endif
+}
+
 // Whether the weaker of two branches goes on: then it has one fork less, and a part of the interactions. The mirror image at the
 // first interface is free.
 bool forks_on(inout Ray stronger, inout Ray weaker) {
@@ -283,7 +321,7 @@ bool forks_on(inout Ray stronger, inout Ray weaker) {
     // One for each interface ahead of the mirror image, which may not fork.
     int part = is_free ? min(ahead, left / 2) : left / 4;
     if (is_free && !is_reflected(weaker)) { part = left - part; }
-    if (part == 0 || depth > MOST_FORKED || (forks == 0 && !is_free) || strength(weaker.throughput) <= faintest_throughput) { return false; }
+    if (part == 0 || depth > MOST_FORKED || (forks == 0 && !is_free) || sharp_strength(weaker) <= faintest_throughput) { return false; }
     stronger.state -= uint(part) << 11;
     weaker.state = packed_state(depth, is_free ? forks : forks - 1, is_reflected(weaker), part);
     return true;
@@ -308,7 +346,7 @@ int branch(inout Ray ray, out Ray weaker, Ray back, Ray on, vec3 again, bool tot
         if (on_stronger) { weaker.throughput *= again; }
         terminate(weaker);
     }
-    if (!last && strength(ray.throughput) >= faintest_throughput) { return ONE; }
+    if (!last && strength(ray.throughput) >= faintest_throughput && !sees_blur_alone(ray)) { return ONE; }
     // What is reflected totally is looked up as if it left straight on: reflected on, it would most often leave there, too.
     if (!on_stronger) { ray.throughput *= again; }
     if (total) {
@@ -373,7 +411,7 @@ void leave_bodies(inout Ray ray, inout int effective) {
 void leave(Ray ray, Hit hit) {
     int before = effective_medium(ray.interior);
     leave_bodies(ray, before);
-    through_media(ray, before, hit, vec3(0.0), false);
+    through_media(ray, before, hit, false);
     escape(ray, escaped_ray(ray, AIR, vec3(0.0), ray.origin));
 }
 
@@ -387,7 +425,7 @@ int follow_to_end(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, in
     if (leaves && hit.path < NOTHING) { return ONE; }
     if (leaves) { leave_bodies(ray, before); }
     bool on_opaque = !leaves && surface.object >= 0 && int(object_table_row(surface.object).type) == TYPE_OPAQUE;
-    vec3 passed = through_media(ray, before, hit, leaves ? vec3(0.0) : surface.smooth_normal, on_opaque);
+    vec3 left = through_media(ray, before, hit, on_opaque);
     if (leaves) {
         escape(ray, escaped_ray(ray, AIR, vec3(0.0), ray.origin));
         return NONE;
@@ -427,7 +465,7 @@ int follow_to_end(inout Ray ray, out Ray weaker, Hit hit, PrimaryHit primary, in
     // Where rays cannot read textures, all of an object is as where it is first hit.
     if (first || (TEXTURED == 0 && surface.object == primary.object)) { take_material(at, primary); }
     // Light that scatters inside leaves all the same as from a layer.
-    vec3 again = surface.outside || is_layer(before) ? vec3(1.0) : passed;
+    vec3 again = surface.outside || is_layer(before) ? vec3(1.0) : left;
     bool last = depth_of(ray) + 1 >= most_interfaces || interactions_of(ray) <= 1;
     return interact(ray, weaker, at, body, hit, surface, primary, first ? primary.unoccluded : 1.0, again, last);
 }

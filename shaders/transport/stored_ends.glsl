@@ -26,11 +26,16 @@ void store_end(int place, EscapedRay end, vec3 throughput) {
     put_end(at, end.weights.y);
     put_end(at, end.width);
 #endif
+#if AHEAD
+    put_end(at, end.ahead.depth);
+    put_end(at, end.ahead.path);
+    put_end(at, intBitsToFloat(end.ahead.body));
+#endif
 }
 
 EscapedRay stored_end(int place, out vec3 throughput) {
     int at = end_words * place;
-    EscapedRay end = EscapedRay(AIR, -1, vec2(0.0), 0.0, vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), false, 0.0, ellipse_of(no_footprint()));
+    EscapedRay end = EscapedRay(AIR, -1, vec2(0.0), 0.0, vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), false, 0.0, ellipse_of(no_footprint()), NONE_AHEAD);
     int word = floatBitsToInt(take_end_number(at));
     end.object = word >> 1;
     end.reflected = (word & 1) != 0;
@@ -47,6 +52,11 @@ EscapedRay stored_end(int place, out vec3 throughput) {
     end.weights.x = take_end_number(at);
     end.weights.y = take_end_number(at);
     end.width = take_end_number(at);
+#endif
+#if AHEAD
+    end.ahead.depth = take_end_vector(at);
+    end.ahead.path = take_end_number(at);
+    end.ahead.body = floatBitsToInt(take_end_number(at));
 #endif
     return end;
 }

@@ -70,6 +70,11 @@ void store(int place, Ray ray) {
 #if LAYERED || DIFFUSED
     put(at, ray.outwards);
 #endif
+#if AHEAD
+    put(at, ray.ahead.depth);
+    put(at, ray.ahead.path);
+    put(at, intBitsToFloat(ray.ahead.body));
+#endif
 #if FOOTPRINTS
     for (int side = 0; side < 2; ++side) {
         put(at, ray.footprint.point[side]);
@@ -80,7 +85,7 @@ void store(int place, Ray ray) {
 }
 
 Ray stored_ray(int place) {
-    Ray ray = Ray(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(1.0), 0u, 0u, uvec4(0u), vec3(0.0), no_footprint());
+    Ray ray = Ray(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(1.0), 0u, 0u, uvec4(0u), vec3(0.0), no_footprint(), NONE_AHEAD);
     vec4 start = ray_segments[2 * place], along = ray_segments[2 * place + 1];
     ray.origin = start.xyz;
     ray.skipped = start.w;
@@ -101,6 +106,13 @@ Ray stored_ray(int place) {
 #endif
 #if LAYERED || DIFFUSED
     take(at, ray.outwards);
+#endif
+#if AHEAD
+    float body;
+    take(at, ray.ahead.depth);
+    take(at, ray.ahead.path);
+    take(at, body);
+    ray.ahead.body = floatBitsToInt(body);
 #endif
 #if FOOTPRINTS
     for (int side = 0; side < 2; ++side) {

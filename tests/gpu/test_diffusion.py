@@ -12,6 +12,7 @@ import pytest
 
 import translucent as tl
 from translucent.assets import mesh_path
+from translucent.bench.shapes import square_ground
 from translucent.diffusion.cache import FieldCache
 from translucent.diffusion.field import DiffusingBody
 from translucent.diffusion.solution import DiffuseSolution
@@ -271,6 +272,21 @@ def test_an_opaque_ball_is_seen_through_what_is_scattered_ahead(renderer: tl.Ren
     seen = middle(40.0, 0.98)
     np.testing.assert_allclose(seen, middle(0.8, 0.0), atol=0.01)
     assert seen[0] < 0.35
+
+
+def test_what_is_scattered_ahead_shows_the_ground(renderer: tl.Renderer) -> None:
+    """A ball of jelly on a white and on a black ground, in the mean against 256 random paths: .731 .618 .463 and .398
+    .338 .257. Measured: .715 .606 .455 and .349 .297 .225. With the environment instead of the ground: .610 on black.
+    """
+    ball = Sphere(radius=0.8, center=(0.0, 0.81, 0.0)).tessellate(32)
+    jelly = tl.Medium((0.1, 0.2, 0.4), scattering=2.0, anisotropy=0.8, ior=1.4)
+    camera = tl.Camera.look_at((0.0, 2.2, 4.0), (0.0, 0.7, 0.0), fov_y=24.0)
+    truths = {0.8: (0.731, 0.618, 0.463), 0.0: (0.398, 0.338, 0.257)}
+    for color, truth in truths.items():
+        objects = [tl.Object(ball, jelly), square_ground((color,) * 3)]
+        frame = renderer.render(tl.Scene(objects, camera, [], WHITE, environment_shadows=16), (16, 16), samples=4)
+        found = frame.radiance[frame.coverage].mean(axis=0)
+        np.testing.assert_allclose(found, truth, atol=0.06, err_msg=f"ground of {color}")
 
 
 def test_bodies_of_uneven_density_vanish_in_white_light(renderer: tl.Renderer) -> None:

@@ -145,6 +145,11 @@ class Branches:
         Differentials of origins and of directions; (n, 0, 2, 3) where nothing is averaged over footprints.
     outwards : (n, 3) float64
         Normal of the body in which it begins, there, outwards; 0 where it has none.
+    ahead : (n, 3) float64
+        Optical depth of scattering events that its light counts as going straight on. It sees the environment as sharp
+        as without them by exp(-ahead), and else blurred.
+    ahead_body : (n,) int64
+        Body in which they were last, NOTHING for none.
     """
 
     origins: Array
@@ -159,6 +164,8 @@ class Branches:
     blur: Array
     footprint: Array
     outwards: Array
+    ahead: Array
+    ahead_body: Integers
 
     def __len__(self) -> int:
         return len(self.owner)

@@ -31,10 +31,8 @@ from translucent.cpu.surroundings import Surroundings, first_footprints, moved_o
 from translucent.diffusion.field import DiffusionField
 from translucent.diffusion.interfaces import AIR, InterfaceTable
 from translucent.formulas import optics
-from translucent.formulas.diffuse_interface import diffuse_interface
 from translucent.formulas.diffusion import (
     IN_SCATTERED_ROUGHNESS,
-    ahead_mirrored,
     scattered_ahead,
     staying_fraction,
 )
@@ -132,11 +130,11 @@ class DiffusionFields:
         """(k,): whether light diffuses in either of the effective media on the two sides of a surface."""
         return np.asarray(np.isin(np.stack([before, after]), list(self._fields)).any(axis=0))
 
-    def in_scattered(self, body: Integers) -> Array:
-        """(k, 3, 3): fraction of the extinction in bodies (k,) by forward scattering; see `in_scattered_shares`."""
-        found = np.zeros((len(body), 3, 3))
+    def ahead(self, body: Integers) -> Array:
+        """(k, 3): fraction of the extinction in bodies (k,) by forward scattering."""
+        found = np.zeros((len(body), 3))
         for number, field in self._fields.items():
-            found[body == number] = np.stack([field.ahead, *field.in_scattered])
+            found[body == number] = field.ahead
         return found
 
     def ior(self, body: Integers) -> Array:
@@ -144,17 +142,6 @@ class DiffusionFields:
         found = np.ones(len(body))
         for number, field in self._fields.items():
             found[body == number] = field.ior
-        return found
-
-    def mirrored_ahead(self, body: Integers, cosine: Array, depth: Array) -> Array:
-        """(k, 3): fractions of forward-scattered light that interfaces of bodies (k,) mirror: see `ahead_mirrored`."""
-        found = np.zeros(depth.shape)
-        for number, field in self._fields.items():
-            chosen, interface = np.flatnonzero(body == number), diffuse_interface(field.ior)
-            shares = interface.reflected, interface.reflected_flux
-            found[chosen] = ahead_mirrored(
-                cosine[chosen, None], field.ior, *shares, depth[chosen], field.phase.mean_cosine
-            )
         return found
 
     def environment_behind(self, body: Integers, directions: Array, depth: Array, other: Array) -> Array:
@@ -336,6 +323,8 @@ class _Growth:
             np.zeros(count),
             self._pixel_footprints(rays.directions),
             np.zeros((count, 3)),
+            np.zeros((count, 3)),
+            np.full(count, NOTHING, np.int64),
         )
         while len(branches):
             branches = self._step(branches)
@@ -415,68 +404,32 @@ class _Growth:
         emitted, passed = self.segments.along(self._rays(own), own.interior, length[inside] * self.caster.radius)
         if emitted is not None:
             self._add(own, emitted)
+        throughput, ahead, ahead_body = branches.throughput.copy(), branches.ahead.copy(), branches.ahead_body.copy()
         if self.tree.diffused:
+            self._add_diffused(own, passed, length[inside])
             hits = face[inside]
-            first = hits[np.arange(len(inside)), (hits >= 0).argmax(axis=1)]
-            # What is scattered ahead comes from an opaque object where the branch ends on one, and not from behind it.
             items = np.where(hits >= 0, self.caster.faces.item[hits], NOTHING)
-            goes_on = np.asarray(~self.table.is_opaque[items].any(axis=1))
-            self._add_diffused(own, passed, first, length[inside], goes_on)
-            on = np.flatnonzero(goes_on)
+            on = np.flatnonzero(~self.table.is_opaque[items].any(axis=1))  # others end on an opaque object
             self._add_ahead_from_lights(own.where(on), length[inside][on] * self.caster.radius, passed[on])
-            passed = np.where(goes_on[:, None], passed, self._unturned(own, passed))
-        throughput = branches.throughput.copy()
+            body = self.media.effective(own.interior)
+            counted = self.tree.diffused.ahead(body)
+            ahead[inside] -= counted * np.log(np.maximum(passed, np.finfo(np.float64).tiny))
+            ahead_body[inside] = np.where(counted.any(axis=1), body, ahead_body[inside])
+            # Diffusion counts light that is scattered ahead as unscattered, and so do branches.
+            with np.errstate(under="ignore"):
+                passed = passed ** (1.0 - counted)
         with np.errstate(under="ignore"):
             throughput[inside] *= passed
-        return replace(branches, throughput=throughput)
+        return replace(branches, throughput=throughput, ahead=ahead, ahead_body=ahead_body)
 
-    def _unturned(self, branches: Branches, passed: Array) -> Array:
-        """(n, 3): transmittance without scattering ahead, for a transmittance (n, 3)."""
-        ahead = self.tree.diffused.in_scattered(self.media.effective(branches.interior))[:, 0]
-        with np.errstate(under="ignore"):
-            return np.asarray(passed ** (1.0 - ahead))
-
-    def _add_diffused(self, branches: Branches, passed: Array, face: Integers, length: Array, goes_on: Mask) -> None:
-        """Add subsurface light, and in-scattered light of forward scattering, which diffusion counts as unscattered.
-
-        The latter where branches go on (n,).
-        """
+    def _add_diffused(self, branches: Branches, passed: Array, length: Array) -> None:
+        """Add subsurface light."""
         body = self.media.effective(branches.interior)
-        ahead, far, near = np.moveaxis(self.tree.diffused.in_scattered(body), 1, 0)
         optical_depth, rays = -np.log(np.maximum(passed, np.finfo(np.float64).tiny)), self._rays(branches)
         points, path = rays.origins + self.scene.camera.eye, length * self.caster.radius
         diffused = self.tree.diffused.radiance(body, points, rays.directions, branches.outwards, path, optical_depth)
         with np.errstate(under="ignore"):
-            self._add(branches, diffused * (1.0 - passed ** (1.0 - ahead)))
-        in_scattered = np.flatnonzero(ahead.any(axis=1) & goes_on)
-        if in_scattered.size:
-            own, ahead, far, near = (
-                branches.where(in_scattered),
-                ahead[in_scattered],
-                far[in_scattered],
-                near[in_scattered],
-            )
-            body, face = body[in_scattered], face[in_scattered]
-            passed, length = passed[in_scattered], length[in_scattered]
-            # Of the optical depth, which varies as the density does, the part by such events does not count.
-            with np.errstate(under="ignore"):
-                through = passed ** (1.0 - ahead)
-            behind, before = (
-                self.tree.surroundings.blurred(own, sign * own.directions, IN_SCATTERED_ROUGHNESS)
-                for sign in (1.0, -1.0)
-            )
-            points = own.origins + length[:, None] * own.directions
-            normals, _ = self.caster.facing_normals(face, points, own.directions)
-            ior = self.tree.diffused.ior(body)
-            cosine = -dot(own.directions, normals)
-            leaving = refracted_direction(own.directions, normals, 1.0 / ior)
-            leaves = optics.fresnel_dielectric(cosine, 1.0 / ior)[:, None] < 1.0
-            leaving = np.where(leaves, leaving, own.directions)
-            blurred = self.tree.surroundings.blurred(own, leaving, IN_SCATTERED_ROUGHNESS)
-            depth = -np.log(np.maximum(passed, np.finfo(np.float64).tiny)) * ahead
-            mirrored = self.tree.diffused.mirrored_ahead(body, cosine, depth)
-            seen = self.tree.diffused.environment_behind(body, leaving, depth, blurred)
-            self._add(own, (through - passed) * ((1.0 - mirrored) * seen + mirrored * (far * behind + near * before)))
+            self._add(branches, diffused * (1.0 - passed ** (1.0 - self.tree.diffused.ahead(body))))
 
     def _add_ahead_from_lights(self, branches: Branches, length: Array, passed: Array) -> None:
         """Add light of the lights that is scattered ahead in walls of parallel sides; length (n,) in metres."""
@@ -486,7 +439,7 @@ class _Growth:
         if not walls.size:
             return
         branches, anisotropy, leaving = branches.where(walls), anisotropy[walls], leaving[walls]
-        rays, ahead = self._rays(branches), self.tree.diffused.in_scattered(body[walls])[:, 0]
+        rays, ahead = self._rays(branches), self.tree.diffused.ahead(body[walls])
         ends = rays.origins + length[walls, None] * rays.directions
         depth = -np.log(np.maximum(passed[walls], np.finfo(np.float64).tiny))
         found, eye, ior = np.zeros(ends.shape), self.scene.camera.eye, self.tree.diffused.ior(body[walls])
@@ -637,8 +590,17 @@ class _Growth:
         self._add(branches, reflected_radiance(self.scene, self._rays(branches), wall, self.tree.light.on_opaque))
 
     def _look_up(self, branches: Branches) -> None:
-        if len(branches):
-            self._add(branches, self.tree.surroundings.radiance(branches, self._rays(branches)))
+        if not len(branches):
+            return
+        radiance = self.tree.surroundings.radiance(branches, self._rays(branches))
+        blurred = np.flatnonzero(branches.ahead.any(axis=1))
+        if blurred.size:
+            own = branches.where(blurred)
+            around = self.tree.surroundings.blurred(own, own.directions, IN_SCATTERED_ROUGHNESS)
+            around = self.tree.diffused.environment_behind(own.ahead_body, own.directions, own.ahead, around)
+            with np.errstate(under="ignore"):
+                radiance[blurred] = around + np.exp(-own.ahead) * (radiance[blurred] - around)
+        self._add(branches, radiance)
 
     def _rays(self, branches: Branches) -> Rays:
         """The branches in metres from the eye."""

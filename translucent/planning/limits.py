@@ -385,8 +385,6 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
         )
         if thin := [body for body in bodies if _is_thin(body)]:
             text += f"; where light is hardly scattered twice, as in {object_names(thin)}, up to 20 % wrong"
-            if ground is not None and any(map(_scatters_ahead, thin)):
-                text += f", because not {ground.ground.mesh.name!r} but the environment is scattered forward"
         if scene.lights:
             text += (
                 "; where lights shine from behind, bodies are up to 30 % too dark, and rims up to 40 % too bright "

@@ -249,7 +249,9 @@ class _Room:
         self.channels = 3 if switches["DISPERSION"] else 1
         self.words = _words(switches)
         # Words of the record of an end in shaders/transport/stored_ends.glsl.
-        self.end_words = 16 + bool(switches["MICROFACETS"]) + 4 * bool(switches["TEXTURED"])
+        self.end_words = (
+            16 + bool(switches["MICROFACETS"]) + 4 * bool(switches["TEXTURED"]) + 5 * bool(switches["AHEAD"])
+        )
         branch = 4 * (self.words + 9)
         most = MOST_BYTES // (2 * branch + (_LIVE_BYTES + 8 * self.end_words) // 2)
         self.places = min(self.channels * max(MORE_PLACES * len(pixels), LEAST_PLACES), most)
@@ -368,7 +370,7 @@ def _words(switches: Mapping[str, bool | int]) -> int:
     """Words of the record of a ray in ``shaders/transport/stored_rays.glsl``, in whole vectors."""
     interior = 1 if switches["ONE_OBJECT"] else 4
     outwards = 3 if switches["LAYERED"] or switches["DIFFUSED"] else 0
-    words = 3 + interior + 2 * switches["MICROFACETS"] + outwards + 12 * switches["FOOTPRINTS"]
+    words = 3 + interior + 2 * switches["MICROFACETS"] + outwards + 5 * switches["AHEAD"] + 12 * switches["FOOTPRINTS"]
     return -(-words // 4) * 4
 
 

@@ -243,7 +243,8 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
     surfaces = [body.surface for body in scene.bodies if body.surface is not None]
     rough = any(max(surface.roughness, surface.clearcoat_roughness) > 0 for surface in surfaces)
     shadows = interface_shadow_switches(job)
-    diffused, has_ground = job.diffused_light is not None, job.resources.shadows.ground is not None
+    light, has_ground = job.diffused_light, job.resources.shadows.ground is not None
+    diffused = light is not None
     return {
         "FORKS": job.plan.interfaces.tree[1] if job.plan.interfaces else 0,
         "FROM_EYE": job.placed.starts_inside or any(not (body.has_interface or body.covers) for body in scene.bodies),
@@ -254,6 +255,7 @@ def _switches(job: FrameJob, *, mirror: bool) -> dict[str, bool | int]:
         "EMISSION": 2 if job.features.straight_light else int(job.features.emits),
         "LAYERED": any(treatment_of(body) is Treatment.LAYER for body in scene.bodies),
         "DIFFUSED": diffused,
+        "AHEAD": light is not None and any(own.ahead.any() for own in light.fields.surfaces.values()),
         "MICROFACETS": mirror or rough,
         "ROUGH": rough,
         "LIGHTS": bool(scene.lights),
