@@ -405,6 +405,9 @@ def _subsurface_effects(scene: Scene) -> list[Note]:
         beside = [item for item in scene.opaque if not any(may_hold(body, item) for body in bodies)]
         if others := _off_ground(beside, ground):
             text += f"; light from these bodies does not reach {object_names(others)}: up to 10 % too dark there"
+        if ground is not None and ground.has_walls:
+            name = object_names([ground.ground])
+            text += f"; parts of {name} do not light each other: up to 60 % too dark in the corners of a white room"
         notes.append(Note(NoteKind.DIFFUSED_LIGHT, text))
     return notes
 
