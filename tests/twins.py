@@ -276,13 +276,13 @@ def _disc_arguments() -> list[np.ndarray]:
     return [np.concatenate([middle, radius[:, None]], axis=1), direction]
 
 
-def _highlight_arguments() -> list[np.ndarray]:
-    disc, mirrored = _disc_arguments()
+def _highlight_disc_arguments() -> list[np.ndarray]:
+    disc, _ = _disc_arguments()
     aside = np.roll(disc[:, :3], 5, axis=0) * disc[:, 3:]
     towards = (disc[:, :3] + 0.9 * aside).astype(np.float64)
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-    alpha, cos_view = (np.resize(values, len(disc)) for values in ([1e-3, 0.02, 0.1, 0.3, 1.0], [1e-2, 0.3, 1.0]))
-    return [column.astype(np.float32) for column in (towards, disc, mirrored, alpha, cos_view)]
+    alpha = np.resize([1e-3, 0.02, 0.1, 0.3, 1.0], len(disc))
+    return [column.astype(np.float32) for column in (towards, disc, alpha)]
 
 
 def _base_arguments() -> list[np.ndarray]:
@@ -313,7 +313,7 @@ ARGUMENTS = {
     "cone_attenuation": _cone_arguments(),
     "sphere_point": [np.random.default_rng(4).random((200, 3)).astype(np.float32)],
     "nearest_on_disc": _disc_arguments(),
-    "highlight_from": _highlight_arguments(),
+    "highlight_disc": _highlight_disc_arguments(),
     "disc_peak": _mixed(np.array([1e-3, 0.09, 1.0]), np.array([0.0, 1e-6, 0.1, 0.9]), np.array([1e-3, 0.3, 1.0])),
     "linear_density": _mixed(ALONG, np.array([0.0, 1.0, 1e-6, 1e12]), np.array([0.0, 1.0, 3.0])),
     "exponential_density": _mixed(ALONG, np.array([1e-6, 1.0, 1e12]), np.array([0.0, -1e-7, 1e-3, -0.5, 3.0, -60.0])),
@@ -489,7 +489,7 @@ def _allowed(name: str, exact: np.ndarray, arguments: list[np.ndarray]) -> np.nd
         allowed = allowed + 4 * eps * np.maximum(arguments[1], arguments[2])  # mix may cancel
     if name == "sphere_point":
         allowed = allowed + 8 * eps  # a rounding of 2 pi is one of a cosine of 0
-    if name in {"nearest_on_disc", "highlight_from"}:
+    if name in {"nearest_on_disc", "highlight_disc"}:
         # The middle, 1 long, and what is added to it may cancel down to 1 less the radius.
         allowed = allowed + 8 * eps / (1.0 - arguments[-2 if name == "nearest_on_disc" else 1][:, 3:])
     if name == "trilinear":

@@ -51,13 +51,12 @@ float disc_peak(float alpha, float radius, float cos_view) {
     return alpha * alpha / (alpha * alpha + middle * (0.5 * PI * alpha + middle));
 }
 
-// Direction from which microfacets mirror a light, and w: by what their value is multiplied. Polished ones show a disc; for
-// rough ones it is where the light is, one of several in the disc. mirrored: mirror image of the direction to the eye.
-vec4 highlight_from(vec3 towards, vec4 disc, vec3 mirrored, float alpha, float cos_view) {
-    if (disc.w == 0.0) { return vec4(towards, 1.0); }
+// Disc of a light as microfacets mirror it: all of it if they are polished; if they are rough, the point where the light is, one
+// of several in the disc.
+vec4 highlight_disc(vec3 towards, vec4 disc, float alpha) {
+    if (disc.w == 0.0) { return vec4(towards, 0.0); }
     float rough = clamp(8.0 * alpha / disc.w - 1.0, 0.0, 1.0);
-    vec4 highlight = vec4(normalize(mix(disc.xyz, towards, rough)), (1.0 - rough) * disc.w);
-    return vec4(nearest_on_disc(highlight, mirrored), disc_peak(alpha, highlight.w, cos_view));
+    return vec4(normalize(mix(disc.xyz, towards, rough)), (1.0 - rough) * disc.w);
 }
 
 // Sample a light from a point. Divided by the distance twice: no square overflows.

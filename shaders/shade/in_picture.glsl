@@ -12,6 +12,11 @@ float metres_ahead_of(vec3 point) {
     return dot(point, surface_right.w == 1.0 ? ray_forward.xyz - center_aside() : ray_forward.xyz);
 }
 
+// Metres across a pixel, at a distance from the eye.
+float pixel_metres(float away) {
+    return 2.0 * length(surface_up.xyz) * (surface_right.w == 1.0 ? away : 1.0) / frame_size.y;
+}
+
 // Point at an axial depth on the ray through a pixel.
 vec3 point_at(vec2 pixel, float axial_depth) {
     vec2 ndc = 2.0 * pixel / frame_size.xy - 1.0;

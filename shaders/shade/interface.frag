@@ -44,7 +44,7 @@ void main() {
     // All that takes derivatives comes first: they are undefined where a neighbor has been discarded.
     vec3 normal = mapped_normal(normalize(world_normal), from_eye, surface_uv);
 #if LIGHTS
-    float variance = packed_variance(normal_variance(SURFACE_TEXTURES == 1 ? normal : world_normal));
+    float variance = packed_variance(sample_filter(SURFACE_TEXTURES == 1 ? normal : world_normal, from_eye).normals);
 #else
     const float variance = 0.0;
 #endif

@@ -4,6 +4,7 @@
 
 #include "lib/two_stream.glsl"
 #include "shade/highlight.glsl"
+#include "shade/in_picture.glsl"
 #include "shade/interface_bsdf.glsl"
 #include "shade/lights.glsl"
 #include "shade/shadows.glsl"
@@ -60,24 +61,31 @@ vec3 irradiance_reaching(int light, LightSample arriving, vec3 point, vec3 norma
 }
 
 // Microfacets that reflect the lights, as far as these reach them.
-vec3 highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float alpha, vec3 variance) {
+vec3 highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float alpha, SampleFilter within) {
     vec3 sum = vec3(0.0);
     float cos_view = max(-dot(normal, ray), 1e-3);
     for (int light = 0; light < light_count; ++light) {
         LightSample arriving = light_at(light, point);
         if (dot(normal, arriving.towards) <= 0.0) { continue; }
         float cos_facet;
-        float value = highlight_value(arriving, normal, ray, cos_view, alpha, variance, cos_facet);
+        float value = highlight_value(arriving, normal, ray, cos_view, alpha, within, cos_facet);
         vec3 reflected = value * reflected_by_facets(surface, cos_facet);
         if (max(reflected.r, max(reflected.g, reflected.b)) > FAINTEST_HIGHLIGHT) { sum += reflected * irradiance_reaching(light, arriving, point, normal); }
     }
     return sum;
 }
 
+// Filter of a sample that shows a point. stored: variance of the normals within it.
+SampleFilter sample_filter(vec3 point, float stored) {
+    vec3 from_eye = point + surface_off_axis.xyz + surface_ahead.z * ray_forward.xyz;
+    float width = filter_width() * pixel_metres(metres_ahead_of(point) + surface_ahead.z);
+    return SampleFilter(unpacked_variance(stored), width, surface_right.w == 1.0 ? width / length(from_eye) : 0.0);
+}
+
 // The same with its clear coat. stored: variance of the normals within the pixel.
 vec3 coated_highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float stored) {
-    vec3 variance = unpacked_variance(stored);
-    vec3 sum = highlights(point, normal, ray, surface, surface.roughness * surface.roughness, variance);
+    SampleFilter within = sample_filter(point, stored);
+    vec3 sum = highlights(point, normal, ray, surface, surface.roughness * surface.roughness, within);
 #if CLEAR_COAT
     if (surface.clearcoat.x == 0.0) { return sum; }
     Surface coat = surface;
@@ -85,7 +93,7 @@ vec3 coated_highlights(vec3 point, vec3 normal, vec3 ray, Surface surface, float
     coat.thin_walled = false;
     coat.film = vec3(0.0, 1.0, 0.0);
     sum *= 1.0 - coat_reflectance(surface.clearcoat, clamp(-dot(normal, ray), 0.0, 1.0));
-    sum += surface.clearcoat.x * highlights(point, normal, ray, coat, surface.clearcoat.y * surface.clearcoat.y, variance);
+    sum += surface.clearcoat.x * highlights(point, normal, ray, coat, surface.clearcoat.y * surface.clearcoat.y, within);
 #endif
     return sum;
 }

@@ -7,19 +7,17 @@
 
 // Squared alpha of the filter of one sample in the middle of each pixel, which finds the light of a smaller light with a standard
 // error of 4 %. So do several at low-discrepancy points, at most 5 %, if their filters have four times their area.
-const float PIXEL_ALPHA = 0.6366198;  // 2 / pi
 const float OVERLAP = 4.0;
 const float MOST_NORMAL_VARIANCE = 0.18;
 
-uniform float sample_area;  // in pixels
-
-// What the projected normals within a sample add to the squared alpha of its microfacets, as a symmetric matrix (xx, xy, yy) in
-// `projection`. Takes derivatives. normal: as interpolated over the face, not normalized.
-vec3 normal_variance(vec3 normal) {
+// Filter of a sample; takes derivatives. normal: as interpolated over the face, not normalized; position: from the eye.
+SampleFilter sample_filter(vec3 normal, vec3 position) {
     vec2 pixel = vec2(gl_FragCoord.x, frame_size.y - gl_FragCoord.y) + frame_size.zw;
     mat3x2 axes = projection(normalize(view_ray(pixel, frame_size.xy, ray_right.xyz, ray_up.xyz, ray_forward.xyz)));
     vec2 right = axes * dFdx(normal), up = axes * dFdy(normal);
     vec3 variance = vec3(right.x * right.x + up.x * up.x, right.x * right.y + up.x * up.y, right.y * right.y + up.y * up.y);
     variance *= PIXEL_ALPHA * min(OVERLAP * sample_area, 1.0);
-    return variance * min(1.0, MOST_NORMAL_VARIANCE / max(variance.x + variance.z, 1e-30));
+    variance *= min(1.0, MOST_NORMAL_VARIANCE / max(variance.x + variance.z, 1e-30));
+    float width = filter_width() * sqrt(abs(determinant(mat2(axes * dFdx(position), axes * dFdy(position)))));
+    return SampleFilter(variance, width, ray_up.xyz == vec3(0.0) ? 0.0 : width / length(position));
 }

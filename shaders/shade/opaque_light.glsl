@@ -20,7 +20,7 @@ struct OpaqueSurface {
     float passed_share; // and without: what the base does not reflect
     vec3 emitted;
     vec3 normal;        // unit, towards the side that the mesh calls outside
-    vec3 variance;      // of normals within a sample, see normal_variance.glsl
+    SampleFilter within; // see packed_variance.glsl
     float opacity;      // of texture and vertices
     float unoccluded;   // fraction of the light of the environment that reaches it
     bool is_hole;
@@ -40,7 +40,7 @@ struct OpaqueBsdf {
     vec3 passed;         // fraction of light on the other side
     float alpha;         // of its microfacets,
     float coat_alpha;    // and of those of the clear coat
-    vec3 variance;       // of normals within a sample, see normal_variance.glsl
+    SampleFilter within; // see packed_variance.glsl
     float coat_weight;
 };
 
@@ -68,7 +68,7 @@ OpaqueBsdf opaque_bsdf(OpaqueSurface surface, float cos_view) {
     bsdf.base = below * (surface.base * (1.0 - surface.passed_share));
     bsdf.passed = below * surface.passed;
     bsdf.alpha = surface.roughness * surface.roughness;
-    bsdf.variance = surface.variance;
+    bsdf.within = surface.within;
 #if CLEAR_COAT
     bsdf.coat = clearcoat_layer(surface.clearcoat, cos_view);
     bsdf.coat_weight = surface.clearcoat.x;
@@ -84,12 +84,12 @@ OpaqueBsdf opaque_bsdf(OpaqueSurface surface, float cos_view) {
 // Evaluate it for light from the front, times the cosine of that. ray: unit, from the eye.
 vec3 opaque_value(OpaqueBsdf bsdf, vec3 normal, vec3 ray, LightSample arriving, float cos_view, float cos_light) {
     float cos_facet;
-    float facets = highlight_value(arriving, normal, ray, cos_view, bsdf.alpha, bsdf.variance, cos_facet);
+    float facets = highlight_value(arriving, normal, ray, cos_view, bsdf.alpha, bsdf.within, cos_facet);
     float away = pow(1.0 - min(cos_facet, 1.0), 5.0);
     vec3 reflected = mix(layer_reflectance(bsdf.dielectric, away), layer_reflectance(bsdf.metal, away), bsdf.metallic);
     vec3 value = reflected * facets + bsdf.base * (cos_light / PI);
 #if CLEAR_COAT
-    facets = highlight_value(arriving, normal, ray, cos_view, bsdf.coat_alpha, bsdf.variance, cos_facet);
+    facets = highlight_value(arriving, normal, ray, cos_view, bsdf.coat_alpha, bsdf.within, cos_facet);
     away = pow(1.0 - min(cos_facet, 1.0), 5.0);
     value = (1.0 - bsdf.coated) * value + bsdf.coat_weight * layer_reflectance(bsdf.coat, away) * facets;
 #endif

@@ -34,6 +34,6 @@ OpaqueSurface opaque_surface_at(vec3 base, vec3 normal, vec3 position, vec2 uv, 
     vec3 emitted = opaque_emissive * textured_emission(uv);
     vec3 mapped = mapped_normal(normalize(normal), position, uv);
     return OpaqueSurface(base * textured.rgb, opaque_metallic * rough.b, clamp(opaque_roughness * rough.g, 0.0, 1.0), opaque_ior,
-        opaque_passed, opaque_passed_share, emitted, mapped, normal_variance(SURFACE_TEXTURES == 1 ? mapped : normal), textured.a, unoccluded(uv),
-        textured.a < opaque_hole_below, opaque_film, vec2(opaque_clearcoat, opaque_clearcoat_roughness), NO_IRRADIANCE_MAP);
+        opaque_passed, opaque_passed_share, emitted, mapped, sample_filter(SURFACE_TEXTURES == 1 ? mapped : normal, position),
+        textured.a, unoccluded(uv), textured.a < opaque_hole_below, opaque_film, vec2(opaque_clearcoat, opaque_clearcoat_roughness), NO_IRRADIANCE_MAP);
 }

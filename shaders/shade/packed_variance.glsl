@@ -1,4 +1,24 @@
-// A symmetric matrix of two rows, as a picture stores it in one number: see normal_variance.glsl.
+// What a sample averages highlights over, and a symmetric matrix of two rows as a picture stores it in one number.
+
+// Filters of one sample in the middle of each pixel, in pixels. Samples find the light of a smaller light with a standard error of
+// 4 % by GGX of this squared alpha (2 / pi), and of 0.7 % by (1 - r^2)^3 of this radius.
+const float PIXEL_ALPHA = 0.6366198;
+const float PIXEL_RADIUS = 1.2;
+
+uniform float sample_area;  // in pixels
+
+// Filter of the highlights of a sample. All zero: none.
+struct SampleFilter {
+    vec3 normals;  // squared alpha of the normals within it, as a symmetric matrix (xx, xy, yy) in `projection`
+    float width;   // of the filter of half vectors, in metres across the ray: that of a pixel for one sample
+    float turn;    // the same as an angle between rays, in radians
+};
+
+const SampleFilter NO_FILTER = SampleFilter(vec3(0.0), 0.0, 0.0);
+
+// Width of the filter of half vectors, in pixels. Of several samples at low-discrepancy points it has eight times their area: its
+// standard error is then at most 2 %.
+float filter_width() { return sqrt(min(8.0 * sample_area, 1.0)); }
 
 const float LEAST_PACKED = 24.0;  // octaves below 1
 

@@ -48,11 +48,6 @@ struct EscapedRay {
     EventsAhead ahead;
 };
 
-// Metres across a pixel, at a distance from the eye.
-float pixel_metres(float away) {
-    return 2.0 * length(surface_up.xyz) * (surface_right.w == 1.0 ? away : 1.0) / frame_size.y;
-}
-
 #if OPAQUE
 uniform int picture_first;  // 1: the picture has light of opaque objects that rays do not find
 

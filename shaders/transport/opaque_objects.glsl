@@ -6,7 +6,7 @@ OpaqueSurface opaque_surface(ObjectRow body, vec3 normal, vec3 point) {
     float ior = body.plain == 1.0 ? 1.0 : body.ior;
     IrradianceMap map = IrradianceMap(body.grid_low, body.grid_x, body.grid_y, body.grid_z, body.grid_size, body.first_layer, body.diffuses);
     return OpaqueSurface(base_color(body, point), body.metallic, body.roughness, ior, body.passed, body.passed_share, body.emissive,
-        normal, vec3(0.0), 1.0, 1.0, false, body.film, vec2(body.clearcoat, body.clearcoat_roughness), map);
+        normal, NO_FILTER, 1.0, 1.0, false, body.film, vec2(body.clearcoat, body.clearcoat_roughness), map);
 }
 
 // Radiance of an opaque object along a ray, lit as where it is visible directly.

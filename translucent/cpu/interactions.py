@@ -16,7 +16,7 @@ from translucent.diffusion.interfaces import InterfaceTable
 from translucent.formulas import optics
 from translucent.formulas.bsdf import Interaction, below_coat, diffuse_radiance, microfacet_normal, microfacet_value
 from translucent.formulas.interface import CLEARCOAT_IOR, reflected_direction, refracted_direction
-from translucent.formulas.light import highlight_from
+from translucent.formulas.light import disc_peak, highlight_disc, nearest_on_disc
 from translucent.geometry.ray_caster import SceneRayCaster, dot, unit
 from translucent.planning.bodies import textured_at_hits
 from translucent.reference.hits import Rays
@@ -330,8 +330,9 @@ class InterfaceLight:
                 disc = np.column_stack([to_disc / away[:, None], np.minimum(light.disc[3] / away, 0.9)])
                 cos_view = dot(to_eye, at.normal)
                 image = 2.0 * cos_view[:, None] * at.normal - to_eye
-                found = highlight_from(to_light, disc, image, alpha, np.maximum(cos_view, 1e-3))
-                reflected_at, peak = found[:, :3], found[:, 3]
+                disc = highlight_disc(to_light, disc, alpha)
+                reflected_at = nearest_on_disc(disc, image)
+                peak = disc_peak(alpha, disc[:, 3], np.maximum(cos_view, 1e-3))
             half = unit(to_eye + reflected_at)
             cos_half, cos_light = (np.clip(dot(at.normal, direction), 0.0, 1.0) for direction in (half, to_light))
             cos_facet = at.cosine(half)

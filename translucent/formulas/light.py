@@ -82,16 +82,10 @@ def disc_peak(alpha: npt.ArrayLike, radius: npt.ArrayLike, cos_view: npt.ArrayLi
         return np.asarray(alpha * alpha / (alpha * alpha + half_way * (0.5 * np.pi * alpha + half_way)))
 
 
-def highlight_from(
-    towards: npt.ArrayLike,
-    disc: npt.ArrayLike,
-    mirrored: npt.ArrayLike,
-    alpha: npt.ArrayLike,
-    cos_view: npt.ArrayLike,
-) -> Array:
-    """(..., 4): direction from which microfacets mirror a light, and the factor of their value.
+def highlight_disc(towards: npt.ArrayLike, disc: npt.ArrayLike, alpha: npt.ArrayLike) -> Array:
+    """(..., 4): disc of a light as microfacets mirror it, as in `nearest_on_disc`.
 
-    Polished ones show a disc; for rough ones it is where the light is, one of several in the disc.
+    Polished ones mirror all of it; for rough ones it is the point where the light is, one of several in the disc.
 
     Parameters
     ----------
@@ -99,10 +93,8 @@ def highlight_from(
         Unit vectors to the light.
     disc : array_like (..., 4)
         Unit vectors to the middle of the disc, and its radius over its distance, below 1; 0 for none.
-    mirrored : array_like (..., 3)
-        Mirror images of the directions to the eye.
-    alpha, cos_view : array_like (...)
-        Of the microfacets; cosines between the directions to the eye and the normals, above 0.
+    alpha : array_like (...)
+        Of the microfacets.
     """
     towards, disc, alpha = (np.asarray(value, np.float64) for value in (towards, disc, alpha))
     radius = disc[..., 3]
@@ -110,7 +102,4 @@ def highlight_from(
         rough = np.where(radius > 0.0, np.clip(8.0 * alpha / radius - 1.0, 0.0, 1.0), 1.0)[..., None]
         middle = (1.0 - rough) * disc[..., :3] + rough * towards
         middle /= np.linalg.norm(middle, axis=-1, keepdims=True)
-        effective_disc = np.concatenate([middle, (1.0 - rough) * radius[..., None]], axis=-1)
-        peak = np.where(radius > 0.0, disc_peak(alpha, effective_disc[..., 3], cos_view), 1.0)
-        found = np.where(radius[..., None] > 0.0, nearest_on_disc(effective_disc, mirrored), towards)
-    return np.concatenate([found, np.broadcast_to(peak[..., None], (*found.shape[:-1], 1))], axis=-1)
+        return np.concatenate([middle, (1.0 - rough) * radius[..., None]], axis=-1)

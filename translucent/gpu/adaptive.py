@@ -13,8 +13,7 @@ import numpy.typing as npt
 
 from translucent.formulas.sampling import sample_shifts, sobol_points
 from translucent.gpu.constants import ENLARGED_ACROSS, PIXEL_PARTS
-from translucent.gpu.job import FrameJob
-from translucent.gpu.passes.caustics import ROUNDS, ROUNDS_FROM
+from translucent.gpu.job import ROUNDS, ROUNDS_FROM, FrameJob
 from translucent.gpu.passes.opaque import is_smooth
 from translucent.gpu.passes.ray_generations import pixel_words
 from translucent.gpu.passes.traced_interfaces import FEW_SAMPLES, interior_at_eye, mirrored_part, unsettled_part

@@ -20,7 +20,7 @@ from translucent.errors import RenderError
 from translucent.gpu.constants import CONSTANTS, MOST_PHOTON_HITS, PHOTON_WIDTH, STORAGE_BINDINGS
 from translucent.gpu.context import require_interfaces
 from translucent.gpu.embree_hits import Floats, RayHits
-from translucent.gpu.job import FrameJob
+from translucent.gpu.job import ROUNDS, ROUNDS_FROM, FrameJob
 from translucent.gpu.passes.opaque import SURFACE_SAMPLERS, OpaquePass, set_surface, shadow_switches
 from translucent.gpu.passes.traced_interfaces import RAY_SAMPLERS, ray_switches, traced_scene
 from translucent.gpu.passes.variants import ComputeVariants, Variants, coat_switches, look_switches
@@ -38,10 +38,6 @@ _RECEIVED = ("photon_irradiance", "opaque_axial_depth", "receiver_normal")
 #: first number, up to a pixel wide. Of polished glass errors of pictures are larger with 8, and with 32 as large;
 #: rough interfaces blur caustics, and errors are smaller by up to a third with four times as many.
 ENOUGH, ENOUGH_OF_ROUGH = 16.0, 64.0
-
-#: Samples with photons, in frames of so many samples at least: drawing what they land on takes a fifth of a sample's
-#: time. Of the Sobol points the second four lie in the four quarters of a pixel, and their mean in its middle.
-ROUNDS, ROUNDS_FROM = range(4, 8), 8
 
 #: Photons that are followed together: 48 bytes each are kept of them.
 BATCH = PHOTON_WIDTH * 512
@@ -304,7 +300,7 @@ def _aim_values(aim: PhotonAim, number: int, job: FrameJob) -> dict[str, Any]:
         "aim_middle": tuple(aim.middle),
         "aim_right": tuple(aim.right),
         "aim_up": tuple(aim.up),
-        "photon_power": tuple(aim.flux * ((len(ROUNDS) if job.few_opaque else job.samples) / aim.photons)),
+        "photon_power": tuple(aim.flux * (job.opaque_samples / aim.photons)),
         "light_interior": tuple(low | high << 16 for low, high in zip(entries[::2], entries[1::2], strict=True)),
     }
 

@@ -198,6 +198,7 @@ class SurfacesPass:
             **coat_switches(job.scene.bodies),
             DIFFUSED=job.diffused_light is not None,
         )
+        set_used(program, {"sample_area": 1.0 / job.samples})
         self._variants.draw_covered(job, program, framebuffer, top_first=True)
         gl.enable_only(blending)
         table.release()

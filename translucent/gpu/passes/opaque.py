@@ -117,7 +117,8 @@ class OpaquePass:
                 program = self._surfaced.program(SURFACE=1, **switches, **looks)
                 self._surfaced.bind(**job.resources.light_textures(environment))
                 set_surface(job, program, surface, surface.alpha_cutoff)
-                set_used(program, {"texture_bias": -0.5 * math.log2(job.samples), "sample_area": 1.0 / job.samples})
+                samples = job.opaque_samples
+                set_used(program, {"texture_bias": -0.5 * math.log2(samples), "sample_area": 1.0 / samples})
             if ground is not None and mapped:
                 ground.texture.use(self._plain.units["ground_shadows"])
                 set_used(program, {"ground_rows": ground.rows, "mapped_ground": ground.plane})

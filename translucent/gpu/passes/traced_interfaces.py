@@ -125,6 +125,7 @@ class TracedInterfacesPass:
             **({"microfacet_points": microfacet_points(job.sample)} if switches["MICROFACETS"] else {}),
             "blurred_fraction": 0.0 if job.plan.request.denoise else blurred_fraction(job.samples),
             "sample_width": job.samples**-0.5,
+            "sample_area": 1.0 / job.samples,
             "picture_first": int(_shows_more(job)),
             **scene_values,
             **_ground(job.scene),
