@@ -39,7 +39,8 @@ LARGEST_EXCHANGING = 2.0
 
 def may_hold(body: Object, item: Object) -> bool:
     """Test whether an object may be inside a body, at least in part, and so receive the light in it."""
-    return _may_be_inside(item, *body.bounds) and (item.medium is not None or _has_faces_in(body, item))
+    filled_or_open = item.medium is not None or not item.mesh.diagnosis.solid
+    return _may_be_inside(item, *body.bounds) and (filled_or_open or _has_faces_in(body, item))
 
 
 def _has_faces_in(body: Object, item: Object) -> bool:
