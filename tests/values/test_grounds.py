@@ -66,7 +66,7 @@ def test_the_top_of_a_slab_is_a_ground(segments: int, mirrored: bool) -> None:
 
 
 def test_which_planes_are_grounds() -> None:
-    """Those that bodies are before, of which a body sees enough; of several the nearest."""
+    """The nearest plane in front of which all bodies stand, and which fills enough of the view of one of them."""
     table, floor, beside = slab(1.0), flat(9.0), tl.Object(Box((0.9, 0, -0.1), (1.1, 0.5, 0.1)).tessellate())
     below = tl.Object(Box((-9, -2, -9), (9, -1, 9)).tessellate())
     ceiling = tl.Object(Box((-9, 2, -9), (9, 3, 9)).tessellate())

@@ -29,14 +29,10 @@ from translucent.commands.options import (
     AnyMediumOptions,
     FileOptions,
     MediumOptions,
-    NamesOf,
-    VerbCommand,
-    group,
-    option,
     overwrite_option,
     refuse_overwriting,
-    takes,
 )
+from translucent.commands.verbs import NamesOf, VerbCommand, group, option, takes
 from translucent.errors import InputError, RenderError, TranslucentError, printable
 from translucent.extras import require_package
 from translucent.units import size_note

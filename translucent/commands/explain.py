@@ -11,17 +11,8 @@ import click
 
 from translucent.commands.console import echo
 from translucent.commands.model import SceneRequest, is_scene_file, medium_lines, models_argument, read_scene
-from translucent.commands.options import (
-    BodyOptions,
-    ChoiceOptions,
-    FileOptions,
-    VerbCommand,
-    common_options,
-    group,
-    option,
-    stage_option,
-    takes,
-)
+from translucent.commands.options import BodyOptions, ChoiceOptions, FileOptions, stage_option
+from translucent.commands.verbs import VerbCommand, common_options, group, option, takes
 from translucent.errors import TranslucentError
 from translucent.units import size_note, tall
 

@@ -18,17 +18,14 @@ from translucent.commands.options import (
     CameraOptions,
     FileOptions,
     MediumOptions,
-    NamesOf,
-    VerbCommand,
     clamp_option,
     clamped,
-    option,
     outside_option,
     overwrite_option,
     refuse_overwriting,
-    takes,
     triple_text,
 )
+from translucent.commands.verbs import NamesOf, VerbCommand, option, takes
 from translucent.errors import InputError, TranslucentError
 
 if TYPE_CHECKING:

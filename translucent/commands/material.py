@@ -13,14 +13,12 @@ from translucent.commands.console import echo
 from translucent.commands.options import (
     FileOptions,
     MediumOptions,
-    group,
-    option,
     outside_option,
     overwrite_option,
     refuse_overwriting,
-    takes,
     triple_text,
 )
+from translucent.commands.verbs import group, option, takes
 from translucent.errors import InputError, RenderError
 
 if TYPE_CHECKING:

@@ -23,11 +23,9 @@ from translucent.commands.options import (
     BodyOptions,
     CameraOptions,
     FileOptions,
-    VerbCommand,
-    collected,
     roughness_option,
-    with_options,
 )
+from translucent.commands.verbs import VerbCommand, collected, with_options
 from translucent.errors import InputError
 from translucent.units import scale_to, size_note, tall
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import click
 
 from translucent.commands.console import echo, takes_colors
-from translucent.commands.options import common_options, triple_text
+from translucent.commands.options import triple_text
+from translucent.commands.verbs import common_options
 from translucent.errors import InputError
 
 if TYPE_CHECKING:

@@ -40,15 +40,13 @@ from translucent.commands.options import (
     FileOptions,
     LookOptions,
     ground_option,
-    group,
-    option,
     overwrite_option,
     read_size,
     refuse_overwriting,
     stage_option,
-    takes,
     verbose_option,
 )
+from translucent.commands.verbs import group, option, takes
 from translucent.errors import InputError
 from translucent.extras import install_command
 from translucent.planning.passes import NoteKind, PassName

@@ -18,7 +18,8 @@ import click
 
 from translucent.commands.console import FILE, echo, is_terminal
 from translucent.commands.model import SceneRequest, read_scene, require_translucent
-from translucent.commands.options import FileOptions, MediumOptions, group, option, read_size, takes
+from translucent.commands.options import FileOptions, MediumOptions, read_size
+from translucent.commands.verbs import group, option, takes
 from translucent.errors import InputError, RenderError, message_of, printable
 
 if TYPE_CHECKING:

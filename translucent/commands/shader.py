@@ -20,7 +20,7 @@ import click
 import numpy as np
 
 from translucent.commands.console import echo
-from translucent.commands.options import common_options
+from translucent.commands.verbs import common_options
 from translucent.errors import InputError
 
 if TYPE_CHECKING:

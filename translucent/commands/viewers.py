@@ -28,17 +28,14 @@ from translucent.commands.options import (
     ChoiceOptions,
     FileOptions,
     LookOptions,
-    VerbCommand,
     ground_option,
-    group,
-    option,
     overwrite_option,
     read_size,
     refuse_overwriting,
     stage_option,
-    takes,
     verbose_option,
 )
+from translucent.commands.verbs import VerbCommand, group, option, takes
 from translucent.errors import InputError, RenderError, TranslucentError, message_of
 from translucent.extras import require_package
 from translucent.units import parse_length
